@@ -59,6 +59,10 @@ def test_the_page_answers_who_when_and_how_sure(weighbridge, results, tmp_path):
     told = json.loads((tmp_path / "fleet.json").read_text())
     assert [r["vehicle_id"] for r in told["overloads"]] == ["truck1", HOSTILE]
     assert told["totals"]["distance_km"] == 80.0
+    (cause,) = told["unjudged"]
+    assert (cause["prevents"], cause["count"], cause["vehicles"]) == ("mass", 1, ["truck3"])
+    assert "mass, 1 leg of truck3" in ran.out
+    assert "<td>mass</td>" in page[page.index('<section id="unjudged">') :]
 
 
 def lesson(vehicle, **more):

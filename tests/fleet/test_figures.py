@@ -13,8 +13,10 @@ from weighbridge.fleet.couplings import Coupling, read_couplings
 from weighbridge.fleet.figures import per_vehicle, quality, rfms, speed_mass, totals
 from weighbridge.fleet.legs import Limits, legs, load_changes
 from weighbridge.fleet.protocol import known_masses, outside, verdicts
+from weighbridge.fleet.schema import LEGS
 from weighbridge.fleet.tickets import Ticket
 from weighbridge.fleet.track import track
+from weighbridge.fleet.unjudged import unjudged
 
 
 def at(hour, minute=0):
@@ -307,8 +309,35 @@ def test_impossible_limits_are_refused(limits):
         legs(*frames([drive("a")]), limits)
 
 
+def test_what_was_not_judged_is_ranked_by_what_it_prevents():
+    lone = {"vehicle_file": None, "gross_kg": None, "tare_kg": None}
+    rows = [
+        drive("a", mass=9000.0, std=300.0),
+        drive("b", "car7", mass=1500.0, std=100.0, **lone),
+        drive("c", "car8", mass=1500.0, std=100.0, **lone),
+        drive("d", "car8", reason_id="torque.none", reason="none", **lone),
+        drive("e", "van1", mass=2500.0, std=100.0, tare_kg=None, distance_km=None),
+        drive("f", "van2", mass=2500.0, std=100.0, gross_kg=None, tare_kg=None),
+        drive("g", "van1", reason_id="speed.none", reason="11 s"),
+        drive("h", "van2", reason_id="speed.none", reason="12 s"),
+    ]
+    found = unjudged(legs(*frames(rows)))
+    assert found.select("prevents", "reason_id", "count", "vehicles").rows() == [
+        ("mass", "speed.none", 2, ["van1", "van2"]),
+        ("mass", "torque.none", 1, ["car8"]),
+        ("overload", "fleet.no_file", 2, ["car7", "car8"]),
+        ("overload", "fleet.no_permitted", 1, ["van2"]),
+        ("payload", "fleet.no_tare", 1, ["van1"]),
+    ]
+    assert found["share"].sum() == pytest.approx(7 / 8)
+    assert found["distance_km"].to_list() == [40.0, 20.0, 40.0, 20.0, 0.0]
+    assert found["example"][0] == "11 s"
+
+
 def test_no_drives_give_empty_figures():
     found = legs(*frames([]))
+    assert unjudged(found).is_empty()
+    assert dict(found.schema) == {name: column.type for name, column in LEGS.items()}
     vehicles = per_vehicle(found, load_changes(found))
     assert json.dumps(totals(vehicles))
     assert totals(vehicles)["known_share"] is None

@@ -11,7 +11,7 @@ from weighbridge.fleet.facts import weighing_row
 from weighbridge.fleet.figures import per_vehicle, speed_mass
 from weighbridge.fleet.inputs import recordings
 from weighbridge.fleet.job import Job, weigh_job
-from weighbridge.fleet.legs import NOT_WEIGHED, legs
+from weighbridge.fleet.legs import legs
 from weighbridge.fleet.protocol import known_masses
 from weighbridge.fleet.store import Results
 from weighbridge.fleet.tickets import Ticket, ticketed
@@ -70,7 +70,7 @@ def test_from_the_stop_after_the_freeze_on_there_is_no_mass(frozen, loading, ins
     assert rest["duration_s"] == pytest.approx(told.drive.duration - off, abs=1.0)
     for name in ("mass_kg", "payload_kg", "overload", "level", "trailer", "empty", "tkm"):
         assert rest[name] is None, name
-    assert rest["reason"] == NOT_WEIGHED
+    assert (rest["prevents"], rest["reason_id"]) == ("mass", "fleet.not_driven_out")
     (row,) = drives.to_dicts()
     assert first["distance_km"] + rest["distance_km"] == pytest.approx(row["distance_km"])
     assert rest["distance_km"] > 0.3

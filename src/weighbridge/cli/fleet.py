@@ -213,17 +213,17 @@ def _summary(folder: Path) -> dict[str, Any]:
     import polars as pl
 
     from weighbridge.fleet.reading import collected, read_drives
+    from weighbridge.fleet.unjudged import unjudged, with_causes
 
     rows = read_drives(folder).select(
-        "key", "outcome", "status", "reason", "mass_kg", "vehicle_id", "vehicle_file", "copies",
-        "also_vehicles",
+        "key", "outcome", "status", "reason_id", "reason", "mass_kg", "tare_kg", "gross_kg",
+        "distance_km", "vehicle_id", "vehicle_file", "copies", "also_vehicles",
     )  # fmt: skip
     frame = collected(rows, folder)
     has_file = pl.col("vehicle_file").is_not_null().any()
     vehicles = frame.group_by("vehicle_id").agg(has_file=has_file)
     recordings = frame.unique("key")
     without = frame.filter((pl.col("outcome") == "weighed") & pl.col("mass_kg").is_null())
-    reasons = frame.filter(pl.col("reason") != "")["reason"].value_counts(sort=True)
     return {
         "drives": frame.height,
         "vehicles": vehicles.height,
@@ -234,7 +234,7 @@ def _summary(folder: Path) -> dict[str, Any]:
         "unread": frame.filter(pl.col("outcome") == "unread").height,
         "failed": frame.filter(pl.col("outcome") == "failed").height,
         "status": dict(without["status"].value_counts(sort=True).iter_rows()),
-        "reasons": list(reasons.head(3).iter_rows()),
+        "unjudged": unjudged(with_causes(frame, "gross_kg")),
     }
 
 
@@ -262,8 +262,7 @@ def _say_summary(found: dict[str, Any]) -> None:
             f"{_count(found['shared'], 'recording')} also under another vehicle: counted for each, "
             "right for one at most"
         )
-    for reason, count in found["reasons"]:
-        say(f"  {count} x {reason}")
+    fleet_report.say_unjudged(found["unjudged"], found["drives"], "drive")
 
 
 def _count(number: int, word: str, words: str | None = None) -> str:

@@ -123,6 +123,29 @@ def _say_answer(found: FleetReport, alarm: float) -> None:
     more = found.overloads.height - _TOLD
     if more > 0:
         say(f"  and {more} more, surest first: -o fleet.html has all")
+    say_unjudged(found.unjudged, t["legs"], "leg")
+
+
+def say_unjudged(causes: pl.DataFrame, of: int, word: str) -> None:
+    """Tell what was not judged, ranked by what it prevents and how often.
+
+    Parameters
+    ----------
+    causes : as of `weighbridge.fleet.unjudged.unjudged`
+    of : rows in all
+    word : what a row is
+    """
+    from weighbridge.fleet.names import some
+
+    if causes.is_empty():
+        return
+    say(f"not judged: {causes['count'].sum()} of {of} {word}s, by what is not known")
+    for row in causes.head(_TOLD).iter_rows(named=True):
+        count = f"{row['count']} {word}{'' if row['count'] == 1 else 's'}"
+        say(f"  {row['prevents']}, {count} of {some(row['vehicles'])}: {row['example']}")
+    more = causes.height - _TOLD
+    if more > 0:
+        say(f"  and {more} more causes: weighbridge fleet report -o fleet.html has all")
 
 
 def say_without_file(without: list[str | None], vehicles: int) -> None:

@@ -11,6 +11,9 @@ from scipy.special import stdtr, stdtrit
 
 from weighbridge.errors import ConfigError
 from weighbridge.fleet.couplings import Coupling, with_couplings
+from weighbridge.fleet.schema import LEGS
+from weighbridge.fleet.unjudged import with_causes
+from weighbridge.messages import Problem
 from weighbridge.signals import Floats
 
 SURE: Final = 1.959964
@@ -20,13 +23,10 @@ _POSITION: Final = tuple(
     f"{edge}_{axis}_deg" for edge in ("start", "end") for axis in ("latitude", "longitude")
 )
 _OF_DRIVE: Final = (
-    "key", "part", "source", "drive", "outcome", "vehicle_id", "vehicle_file", "vehicle_class",
-    "tare_kg", "gross_kg", "status", "reason", "freedom",
+    "key", "part", "date", "source", "drive", "outcome", "vehicle_id", "vehicle_file",
+    "vehicle_class", "tare_kg", "gross_kg", "status", "reason_id", "reason", "freedom",
 )  # fmt: skip
 _OF_LEG: Final = ("mass_kg", "std_kg", "distance_km", "moving_s", *_POSITION)
-
-NOT_WEIGHED: Final = "no force was usable from a stop on, and the load may have changed there"
-"""Why a leg of a drive with a mass has none."""
 
 
 class Limits(NamedTuple):
@@ -85,12 +85,7 @@ def legs(
     Returns
     -------
     polars.DataFrame
-        Beside columns of the drive: ``leg``, ``start``, ``end`` [UTC], ``duration_s``,
-        ``mass_kg``, ``std_kg``, ``shared_kg`` (part of it that all legs of the vehicle share),
-        ``low95_kg``, ``high95_kg``, ``payload_kg``, ``payload_low95_kg``, ``payload_high95_kg``
-        (the empty mass is taken for exact), ``permitted_kg`` (with the trailer that is known to be
-        coupled), ``coupled``, ``overload`` (probability), ``level`` (ok, warn, alarm),
-        ``trailer``, ``empty``, ``tkm``.
+        See `weighbridge.fleet.schema.LEGS`.
 
     Raises
     ------
@@ -117,18 +112,21 @@ def legs(
         payload_kg=pl.col("mass_kg") - pl.col("tare_kg"),
     )
     found = _judged(with_couplings(found.drop("scale"), couplings), limits)
+    found = with_causes(found, "permitted_kg").select(list(LEGS))
     return found.sort("vehicle_id", "start", "source", "leg", nulls_last=True)
 
 
 def _parted(rows: pl.DataFrame) -> pl.DataFrame:
     """Make legs of the segments of drives: one per load, and one per span that was not weighed."""
     bare = pl.col("start_s").is_null()
+    unknown = Problem.of("fleet.not_driven_out")
     drive = ["key", "part"]
     rows = rows.sort(*drive, "segment").with_columns(
         leg=pl.when(pl.col("changed")).then("segment").otherwise(bare.rle_id().over(drive)),
         offset=pl.col("from_s") - pl.col("from_s").min().over(drive),
         duration_s=pl.col("to_s") - pl.col("from_s"),
-        reason=pl.when(bare).then(pl.lit(NOT_WEIGHED)).otherwise("reason"),
+        reason_id=pl.when(bare).then(pl.lit(unknown.id)).otherwise("reason_id"),
+        reason=pl.when(bare).then(pl.lit(unknown.text)).otherwise("reason"),
         # One load has the mass of its drive, whatever its segments have.
         mass_kg=pl.when(pl.col("changed") | bare).then("mass_kg").otherwise("drive_mass"),
         std_kg=pl.when(pl.col("changed") | bare).then("std_kg").otherwise("drive_std"),

@@ -85,7 +85,8 @@ def page(report: FleetReport, title: str) -> str:
         f"<body><h1>{title}</h1>",
         _answer(report),
         _facts(report),
-        f'<nav aria-label="Sections">{links}<a href="#outside">Outside the interval</a>'
+        f'<nav aria-label="Sections">{links}<a href="#unjudged">Not judged</a>'
+        '<a href="#outside">Outside the interval</a>'
         '<a href="#speeds">Speed and mass</a></nav>',
         "<noscript><p>Without JavaScript only the lists above and the last table are shown.</p>"
         "</noscript>",
@@ -94,6 +95,7 @@ def page(report: FleetReport, title: str) -> str:
             "</div></section>"
             for key, name, lead in _SECTIONS
         ),
+        _unjudged(report),
         _outside(report),
         _speeds(report),
         "<footer>Made by weighbridge from data the vehicles recorded. For screening: not a "
@@ -125,7 +127,8 @@ def _answer(report: FleetReport) -> str:
     judged = report.legs["level"].is_not_null().sum()
     why = (
         f"{rest}, {unsure} more likely than {100 * limits.warn:g} %, of {judged} legs that could "
-        f"be judged. {report.legs.height - judged} could not: no mass, or no permitted mass."
+        f"be judged. {report.legs.height - judged} could not: no mass, or no permitted mass "
+        '(<a href="#unjudged">why</a>).'
     )
     rows = "".join(
         f'<tr class="{row["level"]}"><td>{_text(row["vehicle_id"])}</td>'
@@ -164,6 +167,25 @@ def _facts(report: FleetReport) -> str:
     )
     items = "".join(f"<div><dt>{k}</dt><dd>{v}</dd></div>" for k, v in facts)
     return f"<dl>{items}</dl>"
+
+
+def _unjudged(report: FleetReport) -> str:
+    """Table of the causes for which legs were not judged, the worst first."""
+    if report.unjudged.is_empty():
+        return '<section id="unjudged"><h3>Not judged</h3><p>All legs were judged.</p></section>'
+    rows = "".join(
+        f"<tr><td>{row['prevents']}</td><td>{escape(_cut(row['example'] or NOTHING))}</td>"
+        f"<td class=n>{row['count']}</td><td class=n>{_share(row['share'])}</td>"
+        f"<td class=n>{_number(row['distance_km'])}</td>"
+        f"<td>{_text(some(row['vehicles']))}</td></tr>"
+        for row in report.unjudged.iter_rows(named=True)
+    )
+    return (
+        '<section id="unjudged"><h3>Not judged</h3><p class="lead">Legs of which mass, overload or '
+        'payload is not known, and why. What prevents a mass comes first.</p><div class="scroll">'
+        "<table><thead><tr><th>not known<th>why<th class=n>legs<th class=n>of all<th class=n>km"
+        f"<th>vehicles</tr></thead><tbody>{rows}</tbody></table></div></section>"
+    )
 
 
 def _outside(report: FleetReport) -> str:

@@ -17,6 +17,7 @@ from weighbridge.fleet.legs import Limits, legs, load_changes
 from weighbridge.fleet.reading import collected, read_drives, read_segments
 from weighbridge.fleet.tickets import read_tickets
 from weighbridge.fleet.track import track
+from weighbridge.fleet.unjudged import unjudged
 from weighbridge.visible import visible_json
 from weighbridge.whole import write_whole
 
@@ -34,6 +35,7 @@ class FleetReport:
     track : spans with one load, see `weighbridge.fleet.track.track`
     vehicles : one row each, see `weighbridge.fleet.figures.per_vehicle`
     totals : sums, see `weighbridge.fleet.figures.totals`
+    unjudged : why legs were not judged, see `weighbridge.fleet.unjudged.unjudged`
     quality : what is wrong with the data, see `weighbridge.fleet.figures.quality`
     speed_mass : distance by speed and mass, see `weighbridge.fleet.figures.speed_mass`
     outside : known masses outside their intervals, see `weighbridge.fleet.protocol.outside`
@@ -49,6 +51,7 @@ class FleetReport:
     track: pl.DataFrame
     vehicles: pl.DataFrame
     totals: dict[str, Any]
+    unjudged: pl.DataFrame
     quality: pl.DataFrame
     speed_mass: pl.DataFrame
     outside: pl.DataFrame
@@ -77,6 +80,7 @@ class FleetReport:
             "overloads": _rows(self.overloads),
             "load_changes": _rows(self.changes),
             "track": _rows(self.track),
+            "unjudged": _rows(self.unjudged),
             "quality": _rows(self.quality),
             "speed_mass": _rows(self.speed_mass),
             "outside": _rows(self.outside),
@@ -156,6 +160,7 @@ def report(
             "known_legs": int(out["known"].sum()),
             "outside": int(out["outside"].sum()),
         },
+        unjudged=unjudged(rows),
         quality=figures.quality(drives),
         speed_mass=figures.speed_mass(drives, segments),
         outside=out,

@@ -16,6 +16,7 @@ from weighbridge.errors import ConfigError
 from weighbridge.fleet.engine import Count, plain, run_jobs
 from weighbridge.fleet.inputs import Recording, recordings, refuse_missing
 from weighbridge.fleet.job import Job
+from weighbridge.fleet.kept import keep_legs
 from weighbridge.fleet.keys import file_digest, text_digest
 from weighbridge.fleet.learning import learn_fleet, refuse_output
 from weighbridge.fleet.names import some
@@ -219,6 +220,7 @@ def prepared(
         finally:
             results.gather()
             results.settle()
+            keep_legs(results)
             if known is not None:
                 known.unlink(missing_ok=True)
 

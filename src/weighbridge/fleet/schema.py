@@ -1,8 +1,8 @@
 """The tables of a fleet's results: every column, its type and what it is. The only place that
 lists them.
 
-A row of `DRIVES` is one drive, a row of `SEGMENTS` one segment of it. They belong together by
-``key`` and ``part``. Numbers are null where there is none.
+A row of `DRIVES` is one drive, a row of `SEGMENTS` one segment of it, a row of `LEGS` one load.
+They belong together by ``key`` and ``part``. Numbers are null where there is none.
 """
 
 from __future__ import annotations
@@ -130,6 +130,45 @@ SEGMENTS: Final[dict[str, Column]] = {
     "end_longitude_deg": Column(_NUMBER, ""),
 }
 """One row per segment: the mass between stops at which load can change."""
+
+LEGS: Final[dict[str, Column]] = {
+    **{name: Column(DRIVES[name].type, "as of the drive") for name in ("key", "part")},
+    "leg": Column(_COUNT, "which leg, in order of time, from 0; a number may be left out"),
+    **{
+        name: Column(DRIVES[name].type, "as of the drive")
+        for name in ("date", "vehicle_id", "vehicle_file", "vehicle_class", "source", "drive",
+                     "outcome", "status")
+    },
+    "start": Column(_TIME, "begin of the leg, in UTC"),
+    "end": Column(_TIME, "its end, in UTC"),
+    "duration_s": Column(_NUMBER, "from begin to end"),
+    "distance_km": Column(_NUMBER, "driven, from the speed"),
+    "moving_s": Column(_NUMBER, "time in which the vehicle moved"),
+    "mass_kg": Column(_NUMBER, "mass; null where none is known"),
+    "std_kg": Column(_NUMBER, "its standard deviation"),
+    "shared_kg": Column(_NUMBER, "part of std_kg that all legs of the vehicle share"),
+    "freedom": DRIVES["freedom"],
+    "low95_kg": Column(_NUMBER, "lower end of the 95 % interval"),
+    "high95_kg": Column(_NUMBER, "upper end of it"),
+    "tare_kg": DRIVES["tare_kg"],
+    "payload_kg": Column(_NUMBER, "mass minus tare"),
+    "payload_low95_kg": Column(_NUMBER, "lower end of its 95 % interval; the tare is exact"),
+    "payload_high95_kg": Column(_NUMBER, "upper end of it"),
+    "gross_kg": DRIVES["gross_kg"],
+    "permitted_kg": Column(_NUMBER, "permitted mass, with a trailer that is known to be coupled"),
+    "coupled": Column(pl.Boolean(), "a table of couplings names a trailer"),
+    "trailer": Column(pl.Boolean(), "coupled, or taken for one by the mass"),
+    "overload": Column(_NUMBER, "probability that the mass is above the permitted one"),
+    "level": Column(_TEXT, "ok, warn (likely) or alarm (sure); null where overload is"),
+    "empty": Column(pl.Boolean(), "payload below a tenth of the permitted one"),
+    "tkm": Column(_NUMBER, "payload times distance; a payload below zero counts as zero"),
+    "prevents": Column(_TEXT, "what is not known: mass, overload or payload; null where all is"),
+    "reason_id": Column(_TEXT, "id of the message that says why"),
+    "reason": Column(_TEXT, "that message"),
+    **{name: Column(_NUMBER, "position") for name in (
+        "start_latitude_deg", "start_longitude_deg", "end_latitude_deg", "end_longitude_deg")},
+}  # fmt: skip
+"""One row per leg: a span with one load, its payload and its overload."""
 
 WEIGHED: Final = "weighed"
 UNREAD: Final = "unread"

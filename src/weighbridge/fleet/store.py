@@ -7,6 +7,7 @@
     RESULTS/parts/ab/abcd…-0123….found              one place with a recording that has its result
     RESULTS/drives/day=2026-05-01/drives-0000.parquet
     RESULTS/segments/day=2026-05-01/segments-0000.parquet
+    RESULTS/legs/day=2026-05-01/legs-0000.parquet   made of the two, see `weighbridge.fleet.kept`
     RESULTS/superseded.keys                         results that were, and count no more
     RESULTS/progress.json                           how far the last run is, for `fleet status`
 
@@ -267,7 +268,7 @@ class Results:
         """
         for table in TABLES:
             for path in self.table_files(table):
-                _columns(path, None)
+                read_table(path, None)
         for path in self.part_files():
             read_parts([path])
 
@@ -286,7 +287,7 @@ class Results:
     def known_keys(self) -> set[str]:
         """Keys that need not be weighed again: all but those of drives that failed."""
         parts = self.part_files()
-        frames = [_columns(path, ["key", "outcome"]) for path in self.table_files("drives")]
+        frames = [read_table(path, ["key", "outcome"]) for path in self.table_files("drives")]
         found = {k for f in frames for k in f.filter(pl.col("outcome") != FAILED)["key"]}
         for k in range(0, len(parts), _GATHERED):
             some = read_parts(parts[k : k + _GATHERED])
@@ -316,7 +317,7 @@ class Results:
     def _heads(self) -> pl.DataFrame:
         files = self.table_files("drives")
         empty = pl.DataFrame(schema={name: PART[name] for name in HEAD})
-        return pl.concat([empty, *(_columns(path, list(HEAD)) for path in files)])
+        return pl.concat([empty, *(read_table(path, list(HEAD)) for path in files)])
 
     def settle(self, there: Callable[[str], bool] = is_there) -> None:
         """Keep the rows that count, where all parts are gathered: see `standing`.
@@ -338,7 +339,7 @@ class Results:
         dead: set[str] = set()
         stale: list[Path] = []
         for path in self.table_files("drives"):
-            rows = _columns(path, ["key", *state])
+            rows = read_table(path, ["key", *state])
             now = rows.select("key").join(stand, on="key", how="left", maintain_order="left")
             gone = now.filter(pl.col("source").is_null())["key"]
             dead |= set(gone)
@@ -350,11 +351,11 @@ class Results:
             write_whole(self.folder / _SUPERSEDED, "\n".join(keys) + "\n")
             # Segments first: a drive that is left brings the rest here again.
             for path in self.table_files("segments"):
-                if not dead.isdisjoint(_columns(path, ["key"])["key"]):
-                    rows = _columns(path, None)
-                    _write(path, rows.filter(~pl.col("key").is_in(dead)))
+                if not dead.isdisjoint(read_table(path, ["key"])["key"]):
+                    rows = read_table(path, None)
+                    write_table(path, rows.filter(~pl.col("key").is_in(dead)))
         for path in stale:
-            _write(path, counted(_columns(path, None).lazy(), stand).collect())
+            write_table(path, counted(read_table(path, None).lazy(), stand).collect())
         for path in (self.folder / PARTS).glob(f"*/*{_FOUND}"):
             path.unlink(missing_ok=True)
 
@@ -381,19 +382,19 @@ class Results:
         home = self.folder / table / f"{DAY}={UNKNOWN_DATE if day is None else day.isoformat()}"
         files = sorted(home.glob("*.parquet"))
         by: list[str] = [n for n in ("key", "part", "segment") if n in rows.columns]
-        last = _columns(files[-1], None) if files else None
+        last = read_table(files[-1], None) if files else None
         if last is not None and last.height >= FULL:
             last = None
         number = len(files) if last is None else len(files) - 1
         for path in files[:number]:
-            rows = rows.join(_columns(path, by), on=by, how="anti")
+            rows = rows.join(read_table(path, by), on=by, how="anti")
         if rows.is_empty():
             return
         if last is not None:
             # A drive that failed, and fails again, has a new row.
             rows = pl.concat([last.join(rows, on=by, how="anti"), rows])
         home.mkdir(parents=True, exist_ok=True)
-        _write(home / f"{table}-{number:04d}.parquet", rows.sort(by))
+        write_table(home / f"{table}-{number:04d}.parquet", rows.sort(by))
 
     def tell(self, progress: dict[str, Any]) -> None:
         """Write how far a run is."""
@@ -427,7 +428,7 @@ def check_end(path: Path) -> None:
         pl.read_parquet_schema(file)
 
 
-def _write(path: Path, rows: pl.DataFrame) -> None:
+def write_table(path: Path, rows: pl.DataFrame) -> None:
     """Write a file of a table; one without rows stays, as a reader may be about to open it."""
     # By way of the memory: a full disk is told as one, which polars does not.
     data = io.BytesIO()
@@ -436,7 +437,14 @@ def _write(path: Path, rows: pl.DataFrame) -> None:
         part.write_bytes(data.getbuffer())
 
 
-def _columns(path: Path, names: list[str] | None) -> pl.DataFrame:
+def read_table(path: Path, names: list[str] | None) -> pl.DataFrame:
+    """Read columns of a file of a table; all where none is named.
+
+    Raises
+    ------
+    ConfigError
+        It is damaged.
+    """
     with path.open("rb") as file, _whole(path):
         return pl.read_parquet(file, columns=names, hive_partitioning=False)
 
