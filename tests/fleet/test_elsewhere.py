@@ -66,6 +66,40 @@ def test_rows_of_a_store_are_those_of_a_folder(store, scheduler, tmp_path):
     assert there.height == 10
 
 
+def test_what_a_store_lists_as_before_is_not_brought_again(store, tmp_path, monkeypatch):
+    import fsspec
+
+    from weighbridge.fleet.job import weigh_job
+    from weighbridge.fleet.run import FleetSettings, prepared
+
+    drives, cars = store
+    files = fsspec.filesystem("s3")
+    files.put(str(drives / "van0"), "fleet/again/van0", recursive=True)
+    brought = []
+    real = remote.fetch
+
+    def fetch(urls, folder):
+        brought.append(urls[0].rpartition("/")[2])
+        return real(urls, folder)
+
+    monkeypatch.setattr(remote, "fetch", fetch)
+
+    def run():
+        brought.clear()
+        how = FleetSettings()
+        with prepared(["s3://fleet/again/**"], cars, tmp_path / "results", how) as jobs:
+            for job in jobs:
+                weigh_job(job)
+        return brought
+
+    assert run() == ["trip-0000", "trip-0003", "trip-0006"]
+    assert run() == []
+    place = "fleet/again/van0/trip-0003/obd.csv"
+    files.pipe(place, files.cat(place).replace(b"4,", b"5,"))
+    assert run() == ["trip-0003"]
+    assert run() == []
+
+
 def test_a_drive_that_left_the_store_is_tried_again(store, tmp_path):
     _, cars = store
     import fsspec

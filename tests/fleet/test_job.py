@@ -112,7 +112,7 @@ def test_keys_known_from_before_are_not_weighed_again(tmp_path):
     key = weigh_job(one).key
     part_path(Path(one.results), key).unlink()
     known = tmp_path / "keys"
-    known.write_text("\n".join(sorted([key, "0" * 32, "f" * 32])))
+    known.write_text("".join(f"{one}\n" for one in sorted([key, "0" * 32, "f" * 32])))
     told = [weigh_job(job).outcome for job in jobs(tmp_path, drives, cars, known=str(known))]
     assert told == [THERE, "weighed"]
     assert two is not None

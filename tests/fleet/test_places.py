@@ -1,5 +1,6 @@
 """Every recording counts once for its vehicle, at the place where the last run found it."""
 
+import os
 import shutil
 from datetime import UTC, date, datetime
 from pathlib import Path
@@ -35,7 +36,7 @@ def places(rows):
 
 
 def files_of(home):
-    return {f: f.stat().st_mtime_ns for f in (home / "results").glob("**/*.parquet")}
+    return {f: f.stat().st_mtime_ns for f in (home / "results").glob("*/day=*/*.parquet")}
 
 
 def test_one_log_of_five_vans_counts_for_each_and_each_says_so(tmp_path):
@@ -107,6 +108,70 @@ def test_copies_that_are_new_at_once_count_once(tmp_path):
     copy_of(drives / "van0" / "trip-0000", drives / "van0" / "again")
     (row,) = run(tmp_path).to_dicts()
     assert (Path(row["source"]).name, len(row["copies"])) == ("again", 1)
+
+
+def read_again(home, *, places=None):
+    """Run once more; return the names of the recordings whose content was read."""
+    given = str(places or home / "drives")
+    with prepared([given], home / "vehicles", home / "results", FleetSettings()) as jobs:
+        left = [job for job in jobs if not job.there]
+        for job in left:
+            weigh_job(job)
+    return [job.recording.source.rpartition("/")[2] for job in left]
+
+
+def test_what_is_as_it_was_is_not_read_again(tmp_path):
+    drives, cars = tiny_fleet(tmp_path, 4, 2)
+    copy_of(drives / "van0" / "trip-0000", drives / "van0" / "trip-0000 copy")
+    first = run(tmp_path)
+    assert read_again(tmp_path) == []
+    home = drives / "van0" / "trip-0002"
+    (home / "obd.csv").touch()
+    assert read_again(tmp_path) == ["trip-0002"]
+    assert read_again(tmp_path) == []
+    # The same size and the old times, but other bytes.
+    times = (home / "drive.toml").stat()
+    (home / "drive.toml").write_text((home / "drive.toml").read_text().replace("06:02", "07:02"))
+    os.utime(home / "drive.toml", ns=(times.st_atime_ns, times.st_mtime_ns))
+    assert read_again(tmp_path) == ["trip-0002"]
+    rows = read_drives(tmp_path / "results").collect()
+    assert rows.filter(~pl.col("start").is_in(first["start"].implode())).height == 1
+    home.rename(home.with_name("moved"))
+    assert read_again(tmp_path) == ["moved"]
+    car = cars / "van1.toml"
+    car.write_text(car.read_text() + "\n")
+    assert read_again(tmp_path) == ["trip-0001", "trip-0003"]
+    assert read_again(tmp_path) == []
+    for table in ("drives", "segments", "legs"):
+        shutil.rmtree(tmp_path / "results" / table / "day=2026-05-01", ignore_errors=True)
+    assert read_again(tmp_path) == ["trip-0000", "trip-0000 copy"]
+
+
+def test_what_a_killed_run_weighed_is_not_read_again(tmp_path):
+    tiny_fleet(tmp_path, 4, 2)
+    given = [str(tmp_path / "drives")]
+    cars, results = tmp_path / "vehicles", tmp_path / "results"
+    with (
+        pytest.MonkeyPatch.context() as patch,
+        prepared(given, cars, results, FleetSettings()) as jobs,
+    ):
+        # Nothing is gathered any more, as where the command is gone.
+        for name in ("gather", "settle"):
+            patch.setattr(Results, name, lambda self: None)
+        for _ in range(3):
+            weigh_job(next(jobs))
+    assert len(Results(results).part_files()) == 3
+    assert read_again(tmp_path) == ["trip-0003"]
+
+
+def test_a_drive_that_failed_is_tried_again(tmp_path, monkeypatch):
+    tiny_fleet(tmp_path, 2, 1)
+    monkeypatch.setattr("weighbridge.fleet.job._PAUSE", 0.0)
+    with monkeypatch.context() as patch:
+        patch.setattr("weighbridge.fleet.job.content_digest", lambda paths: 1 / 0)
+        assert read_again(tmp_path) == ["trip-0000", "trip-0001"]
+    assert read_again(tmp_path) == ["trip-0000", "trip-0001"]
+    assert read_again(tmp_path) == []
 
 
 def test_drives_that_change_places_keep_their_results(tmp_path):

@@ -166,8 +166,10 @@ class _Run:
         return self._next < len(self._waiting)
 
     def _pull(self) -> Job | None:
-        if self._next == len(self._waiting) and not self._find():
-            return None
+        until = time.monotonic() + _LOOK
+        while self._next == len(self._waiting):
+            if time.monotonic() > until or not self._find():
+                return None
         job = self._waiting[self._next]
         self._next += 1
         if self._next >= 10_000:
@@ -176,15 +178,18 @@ class _Run:
         return job
 
     def _find(self) -> bool:
-        """Find one more job; False where there is none."""
+        """Find one more job, which waits unless its result is there; False where there is none."""
         if self.count.complete:
             return False
         job = next(self._jobs, None)
         if job is None:
             self.count.complete = True
             return False
-        self._waiting.append(job)
         self.count.found += 1
+        if job.there:
+            self.count.add(weigh_job(job))
+        else:
+            self._waiting.append(job)
         return True
 
     def _look_ahead(self) -> None:

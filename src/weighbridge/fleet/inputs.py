@@ -28,12 +28,14 @@ class Recording(NamedTuple):
     vehicle : id that a table of drives gives; None where the path has to give it
     kind : vehicle class that such a table gives
     start : begin that such a table gives, ISO 8601
+    stamp : what the listing of a store says of its files, as of `remote.drives`
     """
 
     paths: tuple[str, ...]
     vehicle: str | None = None
     kind: str | None = None
     start: str | None = None
+    stamp: str | None = None
 
     @property
     def source(self) -> str:
@@ -88,7 +90,8 @@ def recordings(given: Iterable[str]) -> Iterator[Recording]:
 
 def _found(text: str) -> Iterator[Recording]:
     if remote.is_url(text):
-        yield from (Recording((url,)) for url in remote.drives(text, as_drive=_as_drive(text)))
+        for url, stamp in remote.drives(text, as_drive=_as_drive(text)):
+            yield Recording((url,), stamp=stamp)
         return
     path = Path(text)
     if os.path.lexists(path):

@@ -9,7 +9,6 @@ import time
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
-from functools import lru_cache
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -18,7 +17,7 @@ from weighbridge.fleet import remote
 from weighbridge.fleet.inputs import Recording
 from weighbridge.fleet.keys import content_digest, text_digest
 from weighbridge.fleet.schema import FAILED, FORMAT_VERSION, UNREAD, WEIGHED
-from weighbridge.fleet.store import part_path, place_of, write_found, write_part
+from weighbridge.fleet.store import KEY_WIDTH, part_path, write_found, write_part
 from weighbridge.fleet.vehicles import Assigned
 from weighbridge.messages import Problem
 from weighbridge.signals import Drive
@@ -27,6 +26,8 @@ from weighbridge.visible import visible
 
 TRIES: Final = 3
 """How often a drive is tried where the machine fails, and not the data."""
+
+_SEEN: Final = 15  # letters of a digest that a whole number of 64 bits holds
 
 _PAUSE: Final = 0.2  # before the second try; twice as long before the third [s]
 
@@ -43,7 +44,10 @@ class Job:
     dbc : databases of raw CAN logs, seen by all workers
     dbc_digest : of their content
     whole : take the recording as one drive
-    known : file of the keys that are there already, each with its places; None where none is
+    known : file of the keys that are there already, in order, one a line; None where none is
+    seen : digest of the recording's files as they were listed, and of how they are weighed, to know
+        them again without reading; None where the listing does not show whether they change
+    there : the results have it already
     version, format_version : of weighbridge and of the tables, where the job was made
     """
 
@@ -56,6 +60,8 @@ class Job:
     dbc_digest: str = ""
     whole: bool = False
     known: str | None = None
+    seen: int | None = None
+    there: bool = False
     version: str = VERSION
     format_version: int = FORMAT_VERSION
 
@@ -97,6 +103,8 @@ def weigh_job(job: Job) -> Receipt:
     ConfigError
         The folder of the results cannot be written to, or the job was made by another version.
     """
+    if job.there:
+        return Receipt("", THERE, 0, 0, 0.0)
     _refuse_other_version(job)
     begin = time.perf_counter()
     rows: list[dict[str, Any]] = []
@@ -125,9 +133,10 @@ def weigh_job(job: Job) -> Receipt:
         content = None
     elif part_path(Path(job.results), key).exists():
         # A copy of it was weighed at the same time.
-        write_found(Path(job.results), key, visible(job.recording.source))
+        write_found(Path(job.results), key, visible(job.recording.source), job.seen)
         return Receipt(key, THERE, 0, 0, time.perf_counter() - begin)
-    return _written(job, key, [row | {"content": content} for row in rows], tries, begin)
+    told = {"content": content, "seen": job.seen}
+    return _written(job, key, [row | told for row in rows], tries, begin)
 
 
 def fail_job(job: Job, reason: Problem) -> Receipt:
@@ -182,26 +191,40 @@ def _key(job: Job, content: str) -> str:
 
 
 def _is_there(job: Job, key: str) -> bool:
-    """Say whether a recording has its result; note the place where that is a new one."""
-    source = visible(job.recording.source)
-    if not part_path(Path(job.results), key).exists():
-        if job.known is None:
-            return False
-        keys, here = _known(job.known), place_of(key, source)
-        at = bisect.bisect_left(keys, key)
-        if at == len(keys) or not keys[at].startswith(key):
-            return False
-        at = bisect.bisect_left(keys, here)
-        if at < len(keys) and keys[at] == here:
-            return True
-    write_found(Path(job.results), key, source)
+    """Say whether a recording has its result; note the place where it was found."""
+    there = part_path(Path(job.results), key).exists()
+    if not there and (job.known is None or not _is_known(Path(job.known), key)):
+        return False
+    write_found(Path(job.results), key, visible(job.recording.source), job.seen)
     return True
 
 
-@lru_cache(maxsize=1)
-def _known(path: str) -> list[str]:
-    """Read the sorted keys and places once per run and worker."""
-    return Path(path).read_text(encoding="ascii").splitlines()
+def _is_known(path: Path, key: str) -> bool:
+    """Look for a key in a file of sorted ones, without reading it whole."""
+    wanted = f"{key}\n".encode("ascii")
+    with path.open("rb") as file:
+
+        def line(number: int) -> bytes:
+            file.seek(number * KEY_WIDTH)
+            return file.read(KEY_WIDTH)
+
+        lines = range(path.stat().st_size // KEY_WIDTH)
+        at = bisect.bisect_left(lines, wanted, key=line)
+        return at < len(lines) and line(at) == wanted
+
+
+def seen_of(job: Job, stamp: str | None) -> int | None:
+    """Return by what a recording is known again where it is weighed in the same way.
+
+    Parameters
+    ----------
+    job
+    stamp : of its files; None where there is none
+    """
+    if stamp is None:
+        return None
+    digest = text_digest([visible(job.recording.source), stamp, _key(job, "")])
+    return int(digest[:_SEEN], 16)
 
 
 @contextlib.contextmanager

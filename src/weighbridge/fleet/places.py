@@ -15,7 +15,7 @@ import polars as pl
 
 from weighbridge.fleet import remote
 from weighbridge.fleet.names import some
-from weighbridge.fleet.schema import DRIVES, FAILED
+from weighbridge.fleet.schema import DRIVES, FAILED, SEEN
 from weighbridge.messages import Problem
 
 HEAD: Final = ("key", "source", "copies", "content", "vehicle_id", "outcome", "weighed_at")
@@ -27,6 +27,7 @@ FOUND: Final[dict[str, Any]] = {
     "key": pl.String(),
     "place": pl.String(),
     "at": DRIVES["weighed_at"].type,
+    "seen": SEEN["seen"],
 }
 """Columns of places at which a run found a recording that has its result already."""
 

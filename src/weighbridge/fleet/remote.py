@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import re
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
 from weighbridge.errors import DriveError, MissingExtraError
+from weighbridge.fleet.keys import text_digest
 from weighbridge.fleet.names import is_drive_name, is_table_name
 from weighbridge.visible import visible
 
@@ -16,6 +17,12 @@ _URL: Final = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+://")
 
 
 _HOME: Final = "weighbridge-"
+
+_VERSION: Final = (
+    "ETag", "etag", "md5Hash", "generation", "content_md5", "LastModified", "last_modified",
+    "updated", "mtime", "created", "ino",
+)  # fmt: skip
+"""What the listings of stores say of a file that changes with its content."""
 
 
 def is_url(text: str) -> bool:
@@ -28,13 +35,18 @@ def was_url(path: Path) -> bool:
     return re.match(r"[A-Za-z][A-Za-z0-9+.-]+:/", path.as_posix()) is not None
 
 
-def drives(url: str, *, as_drive: bool) -> Iterator[str]:
+def drives(url: str, *, as_drive: bool) -> Iterator[tuple[str, str | None]]:
     """Find recordings behind a URL, which may be a pattern; the rules are those of paths.
 
     Parameters
     ----------
     url : such as ``s3://bucket/drives/**``
     as_drive : each folder that a pattern matches is one drive, whatever is in it
+
+    Returns
+    -------
+    The URL of each, and its stamp: the digest of what the listing says of its files, which changes
+    with their content; None where it says too little
 
     Raises
     ------
@@ -45,18 +57,38 @@ def drives(url: str, *, as_drive: bool) -> Iterator[str]:
     """
     files, root = _store(url)
     try:
+        # What changed since an earlier listing of this process counts, too.
+        files.invalidate_cache()
         if _is_pattern(root) and not files.exists(root):
             found = sorted(files.glob(root))
             if as_drive:
-                folders = [path for path in found if files.isdir(path)]
-                yield from (files.unstrip_protocol(path.rstrip("/")) for path in folders)
+                for path in found:
+                    if files.isdir(path):
+                        yield files.unstrip_protocol(path.rstrip("/")), _stamp(_find(files, path))
                 return
-            below = sorted({f for path in found for f in files.find(path)})
+            below = {f: told for path in found for f, told in _find(files, path).items()}
         else:
-            below = sorted(files.find(root))
+            below = _find(files, root)
     except Exception as error:  # each store has errors of its own
         raise DriveError(f"{url} cannot be listed: {error}") from None
-    yield from (files.unstrip_protocol(path) for path in _grouped(below))
+    for path, inside in _grouped(sorted(below)):
+        yield files.unstrip_protocol(path), _stamp({file: below[file] for file in inside})
+
+
+def _find(files: Any, path: str) -> dict[str, Mapping[str, Any]]:
+    """Files below a path, and what the store says of each."""
+    return dict(files.find(path, detail=True))
+
+
+def _stamp(files: Mapping[str, Mapping[str, Any]]) -> str | None:
+    """Digest of what a store says of files; None where it does not say when one changed."""
+    told = []
+    for path, about in sorted(files.items()):
+        version = [(name, str(about[name])) for name in _VERSION if about.get(name) is not None]
+        if not version:
+            return None
+        told += [path, repr((about.get("size"), version))]
+    return text_digest(told) if told else None
 
 
 def exists(url: str) -> bool:
@@ -139,19 +171,18 @@ def _is_pattern(text: str) -> bool:
     return any(letter in text for letter in "*?[")
 
 
-def _grouped(files: Sequence[str]) -> Iterator[str]:
-    """Folders that hold tables, and other logs, in order."""
+def _grouped(files: Sequence[str]) -> Iterator[tuple[str, list[str]]]:
+    """Folders that hold tables, and other logs, in order; each with its files."""
     folders = {_parent(f) for f in files if is_table_name(_name(f)) and _name(f)}
-    told: set[str] = set()
+    found: dict[str, list[str]] = {}
     for file in files:
         home = _parent(file)
         part_of = home if home in folders else _parent(home)
         if home in folders or (home.endswith(".parts") and part_of in folders):
-            if part_of not in told:
-                told.add(part_of)
-                yield part_of
+            found.setdefault(part_of, []).append(file)
         elif is_drive_name(_name(file)):
-            yield file
+            found[file] = [file]
+    yield from found.items()
 
 
 def _parent(path: str) -> str:

@@ -6,7 +6,7 @@ import contextlib
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -15,9 +15,9 @@ from weighbridge.arguments import suggestion
 from weighbridge.errors import ConfigError
 from weighbridge.fleet.engine import Count, plain, run_jobs
 from weighbridge.fleet.inputs import Recording, recordings, refuse_missing
-from weighbridge.fleet.job import Job
+from weighbridge.fleet.job import Job, seen_of
 from weighbridge.fleet.kept import keep_legs
-from weighbridge.fleet.keys import file_digest, text_digest
+from weighbridge.fleet.keys import file_digest, stamp, text_digest
 from weighbridge.fleet.learning import learn_fleet, refuse_output
 from weighbridge.fleet.names import some
 from weighbridge.fleet.remote import is_url, was_url
@@ -214,6 +214,8 @@ def prepared(
     results = Results.begun(folder)
     with results.locked():
         results.clean()
+        results.gather()
+        results.settle()
         known = _known_file(results)
         try:
             yield _jobs_of(found, shelf, results, how, known, databases)
@@ -258,8 +260,9 @@ def _jobs_of(
     databases: str,
 ) -> Iterator[Job]:
     folder = str(results.folder.resolve())
+    seen = results.seen()
     for recording in found:
-        yield Job(
+        job = Job(
             recording=_whole_path(recording),
             assigned=shelf.of(recording.paths, recording.vehicle, recording.kind),
             results=folder,
@@ -270,6 +273,16 @@ def _jobs_of(
             whole=how.whole,
             known=None if known is None else str(known.resolve()),
         )
+        mark = seen_of(job, _stamp(job.recording))
+        at = seen.searchsorted(mark) if mark is not None else len(seen)
+        yield replace(job, seen=mark, there=bool(at < len(seen) and seen[at] == mark))
+
+
+def _stamp(recording: Recording) -> str | None:
+    """What tells, without reading, whether the files of a recording have changed."""
+    if any(is_url(path) for path in recording.paths):
+        return recording.stamp
+    return stamp([Path(path) for path in recording.paths])
 
 
 def _dbc_digest(paths: Sequence[str]) -> str:
@@ -289,15 +302,13 @@ def _whole_path(recording: Recording) -> Recording:
 
 def _known_file(results: Results) -> Path | None:
     """Write the keys that are there already for the workers; None where none is."""
-    results.gather()
-    results.settle()
-    keys = results.known_places()
+    keys = results.known_keys()
     if not keys:
         return None
     from weighbridge.whole import write_whole
 
     path = results.folder / f".{time.time_ns()}{KEYS}"
-    write_whole(path, "\n".join(sorted(keys)))
+    write_whole(path, "".join(f"{key}\n" for key in keys))
     return path
 
 

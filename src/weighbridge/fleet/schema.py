@@ -178,8 +178,13 @@ FAILED: Final = "failed"
 _OF_DRIVE: Final = ("key", "part", "date", "vehicle_id")
 _INNER: Final = tuple(name for name in SEGMENTS if name not in _OF_DRIVE)
 
+SEEN: Final[dict[str, pl.DataType]] = {"held": pl.String(), "seen": pl.Int64()}
+"""Columns of what a run need not read again: the key of a result with a digest of its place, and a
+digest of its files as a run saw them and of how they were weighed."""
+
 PART: Final[dict[str, pl.DataType]] = {
     **{name: column.type for name, column in DRIVES.items()},
+    "seen": SEEN["seen"],
     "segments": pl.List(pl.Struct({name: SEGMENTS[name].type for name in _INNER})),
 }
 """Columns of a part file, as workers write it: the drives of one recording, segments within."""

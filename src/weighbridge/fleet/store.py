@@ -8,6 +8,7 @@
     RESULTS/drives/day=2026-05-01/drives-0000.parquet
     RESULTS/segments/day=2026-05-01/segments-0000.parquet
     RESULTS/legs/day=2026-05-01/legs-0000.parquet   made of the two, see `weighbridge.fleet.kept`
+    RESULTS/seen/0123….parquet                      recordings that need not be read again
     RESULTS/superseded.keys                         results that were, and count no more
     RESULTS/progress.json                           how far the last run is, for `fleet status`
 
@@ -24,13 +25,16 @@ import io
 import json
 import os
 import secrets
+import time
 from collections.abc import Callable, Iterator, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final
 
+import numpy as np
 import polars as pl
+from numpy.typing import NDArray
 
 from weighbridge.errors import ConfigError
 from weighbridge.fleet.keys import text_digest
@@ -41,6 +45,7 @@ from weighbridge.fleet.schema import (
     FORMAT_VERSION,
     PART,
     READABLE,
+    SEEN,
     UNKNOWN_DATE,
     drives_of,
     segments_of,
@@ -52,6 +57,10 @@ MARK: Final = "fleet.json"
 PROGRESS: Final = "progress.json"
 PARTS: Final = "parts"
 KEYS: Final = "-known.keys"
+KEY_WIDTH: Final = 33
+"""Bytes of a key in the file of the keys that are known, with the end of its line."""
+
+_SEEN: Final = "seen"
 _LOCK: Final = ".lock"
 _SUFFIX: Final = ".arrow"
 _FOUND: Final = ".found"
@@ -83,8 +92,15 @@ def place_of(key: str, source: str) -> str:
     return f"{key} {text_digest([source])[:_PLACE]}"
 
 
-def write_found(folder: Path, key: str, source: str) -> None:
+def write_found(folder: Path, key: str, source: str, seen: int | None) -> None:
     """Note that a recording with a result was found at a place.
+
+    Parameters
+    ----------
+    folder : of the results
+    key : of the result
+    source : the place
+    seen : as of `SEEN`
 
     Raises
     ------
@@ -99,7 +115,8 @@ def write_found(folder: Path, key: str, source: str) -> None:
             path.parent.mkdir(parents=True, exist_ok=True)
         except OSError as e:
             raise ConfigError(f"{path} cannot be written: {e.strerror or e}") from None
-        write_whole(path, json.dumps({"key": key, "place": source, "at": now}) + "\n")
+        told = {"key": key, "place": source, "at": now, "seen": seen}
+        write_whole(path, json.dumps(told) + "\n")
 
 
 def read_found(folder: Path) -> pl.DataFrame:
@@ -109,7 +126,8 @@ def read_found(folder: Path) -> pl.DataFrame:
         # One that is settled meanwhile, or spoilt, is found again by the next run.
         with contextlib.suppress(OSError, ValueError, KeyError, TypeError):
             said = json.loads(path.read_text(encoding="utf-8"))
-            rows.append((said["key"], said["place"], datetime.fromisoformat(said["at"])))
+            at = datetime.fromisoformat(said["at"])
+            rows.append((said["key"], said["place"], at, said.get("seen")))
     return pl.DataFrame(rows, schema=FOUND, orient="row")
 
 
@@ -284,26 +302,47 @@ class Results:
         for left in self.folder.glob(f".*{KEYS}"):
             left.unlink(missing_ok=True)
 
-    def known_keys(self) -> set[str]:
-        """Keys that need not be weighed again: all but those of drives that failed."""
-        parts = self.part_files()
-        frames = [read_table(path, ["key", "outcome"]) for path in self.table_files("drives")]
-        found = {k for f in frames for k in f.filter(pl.col("outcome") != FAILED)["key"]}
-        for k in range(0, len(parts), _GATHERED):
-            some = read_parts(parts[k : k + _GATHERED])
-            found |= set(some.filter(pl.col("outcome") != FAILED)["key"])
-        return found
+    def known_keys(self) -> list[str]:
+        """Keys that need not be weighed again, in order: all but those of drives that failed.
 
-    def known_places(self) -> set[str]:
-        """Keys that need not be weighed again, each with each of its places."""
-        return {
+        All parts are gathered.
+        """
+        return self._good()["key"].unique().sort().to_list()
+
+    def seen(self) -> NDArray[np.int64]:
+        """What need not be read again, in order, see `SEEN`: results that stand at their places.
+
+        All parts are gathered, and the tables settled.
+        """
+        held = [
             place_of(key, place)
-            for key, source, copies in self._heads()
-            .filter(pl.col("outcome") != FAILED)
+            for key, source, copies in self._good()
             .select("key", "source", "copies")
+            .unique("key")
             .iter_rows()
             for place in (source, *(copies or ()))
-        }
+        ]
+        files = sorted((self.folder / _SEEN).glob("*.parquet"))
+        empty = pl.DataFrame(schema=SEEN)
+        all_of = pl.concat([empty, *(read_table(path, list(SEEN)) for path in files)])
+        rows = all_of.unique("held", keep="last", maintain_order=True)
+        rows = rows.filter(pl.col("held").is_in(pl.Series(held, dtype=pl.String).implode()))
+        if len(files) > 1 or rows.height < all_of.height:
+            self._add_seen(rows)
+            for path in files:
+                path.unlink(missing_ok=True)
+        return rows["seen"].sort().to_numpy()
+
+    def _good(self) -> pl.DataFrame:
+        return self._heads().filter(pl.col("outcome") != FAILED)
+
+    def _add_seen(self, rows: pl.DataFrame) -> None:
+        """Keep what was seen; a kill before its source is removed leaves it twice."""
+        if rows.is_empty():
+            return
+        home = self.folder / _SEEN
+        home.mkdir(exist_ok=True)
+        write_table(home / f"{time.time_ns():020d}.parquet", rows.select(list(SEEN)))
 
     def superseded(self) -> set[str]:
         """Keys of results that counted once, and that no run will bring back by itself."""
@@ -356,6 +395,7 @@ class Results:
                     write_table(path, rows.filter(~pl.col("key").is_in(dead)))
         for path in stale:
             write_table(path, counted(read_table(path, None).lazy(), stand).collect())
+        self._add_seen(_held(found, "place"))
         for path in (self.folder / PARTS).glob(f"*/*{_FOUND}"):
             path.unlink(missing_ok=True)
 
@@ -374,6 +414,7 @@ class Results:
             for table, made in TABLES.items():
                 for (day,), own in made(rows).partition_by("date", as_dict=True).items():
                     self._add(table, day, own)
+            self._add_seen(_held(rows.filter(pl.col("part") == 0), "source"))
             for path in some:
                 path.unlink(missing_ok=True)
 
@@ -407,6 +448,13 @@ class Results:
         except (OSError, ValueError):
             return {}
         return found if isinstance(found, dict) else {}
+
+
+def _held(rows: pl.DataFrame, place: str) -> pl.DataFrame:
+    """Return the rows of `SEEN` of results with their places."""
+    kept = rows.filter(pl.col("seen").is_not_null())
+    held = [place_of(*row) for row in kept.select("key", place).iter_rows()]
+    return kept.select(pl.Series("held", held, pl.String), "seen")
 
 
 def _of_version(folder: Path, version: object) -> ConfigError:
