@@ -6,7 +6,20 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.optimize import least_squares
 
 from weighbridge.constants import HUBER
-from weighbridge.signals.robust import huber, resolution, robust_fit, spread
+from weighbridge.signals.robust import huber, resolution, robust_fit, robust_fits, spread
+
+
+def test_fits_together_are_those_alone():
+    """Some are settled at once, some after a few rounds, some never."""
+    rng = np.random.default_rng(9)
+    x = rng.uniform(0.0, 10.0, (6, 80))
+    y = 3.0 * x + 5.0 + rng.standard_t(1.5, size=x.shape) * np.arange(6)[:, None]
+    columns = np.stack([x, np.ones_like(x)], axis=2)
+    found, weight = robust_fits(columns, y)
+    alone = [robust_fit(*one) for one in zip(columns, y, strict=True)]
+    assert_allclose(found, [one[0] for one in alone], rtol=1e-12)
+    assert_allclose(weight, [one[1] for one in alone], rtol=1e-9)
+    assert len({tuple(row) for row in weight.round(6).tolist()}) == 6
 
 
 def test_a_fit_is_the_optimum_of_hubers_loss():

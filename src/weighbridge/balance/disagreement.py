@@ -14,10 +14,12 @@ from weighbridge.balance.witness import (
     LOAD_AIR,
     Comparison,
     Following,
+    Line,
     Means,
     air_of,
     compare,
     follow,
+    line_of,
     means,
     predicted_by,
     ranges_of,
@@ -300,20 +302,27 @@ def _change(every: Means, relation: WitnessRelation) -> int | None:
         cut = every.time.size * k // PARTS
         if min(cut, every.time.size - cut) < FEWEST_MEANS:
             continue
-        before, after = (
-            compare(every.reading[part], predicted[part]) for part in (slice(cut), slice(cut, None))
-        )
-        gain = _apart(before, after, relation)
+        first = every.reading[:cut], predicted[:cut]
+        second = every.reading[cut:], predicted[cut:]
+        # How sure a difference is takes most of the time, and matters to those that are large.
+        if max(_offs(line_of(*first), line_of(*second), relation)) <= CHANGE:
+            continue
+        gain = _apart(compare(*first), compare(*second), relation)
         if gain > best:
             best, at = gain, cut
     return at
 
 
+def _offs(a: Line, b: Line, relation: WitnessRelation) -> tuple[float, float]:
+    """By how much scale and level of two parts differ [-]."""
+    level = abs((a.level - a.predicted) - (b.level - b.predicted)) / relation.span
+    return abs(a.scale - b.scale), level
+
+
 def _apart(a: Comparison, b: Comparison, relation: WitnessRelation) -> float:
     """By how many standard deviations two parts differ surely [-]; 0 where they do not."""
-    scale = abs(a.scale - b.scale)
+    scale, level = _offs(a, b, relation)
     scale_std = float(np.hypot(a.scale_std, b.scale_std))
-    level = abs((a.level - a.predicted) - (b.level - b.predicted)) / relation.span
     level_std = float(np.hypot(a.level_std, b.level_std)) / relation.span
     found = [
         off / max(std, 1e-9)

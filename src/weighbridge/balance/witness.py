@@ -20,7 +20,7 @@ from weighbridge.kernels.first_order import even_lag
 from weighbridge.signals import Bools, Drive, Floats, Ints, Signal
 from weighbridge.signals.correlation import correlations
 from weighbridge.signals.interpolation import interpolate
-from weighbridge.signals.robust import robust_fit
+from weighbridge.signals.robust import robust_fit, robust_fits
 from weighbridge.vehicle.air import standard_pressure
 from weighbridge.vehicle.model import Vehicle, WitnessRelation
 from weighbridge.vehicle.torque import source_of
@@ -167,21 +167,33 @@ class Means:
 
 
 @dataclass(frozen=True, slots=True)
-class Comparison:
+class Line:
     """Reading against what a witness shows, ``reading = level + scale (told - told's mean)``.
 
     Attributes
     ----------
-    scale, scale_std : [-]
-    level, level_std : reading where the witness shows ``predicted``, in the reading's unit
+    scale : [-]
+    level : reading where the witness shows ``predicted``, in the reading's unit
     predicted : mean of what the witness shows
     """
 
     scale: float
-    scale_std: float
     level: float
-    level_std: float
     predicted: float
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison(Line):
+    """A line with its standard deviations.
+
+    Attributes
+    ----------
+    scale_std : [-]
+    level_std : in the reading's unit
+    """
+
+    scale_std: float
+    level_std: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -289,7 +301,7 @@ def predicted_by(relation: WitnessRelation, rows: Means) -> Floats:
     return np.asarray(rows.terms @ np.array(relation.coefficients))
 
 
-def compare(reading: Floats, predicted: Floats) -> Comparison:
+def line_of(reading: Floats, predicted: Floats) -> Line:
     """Fit a scale and a level of the reading against what a witness shows.
 
     Parameters
@@ -298,22 +310,42 @@ def compare(reading: Floats, predicted: Floats) -> Comparison:
 
     References
     ----------
-    Huber, Robust Statistics, 1981, ch. 7; standard deviations by leaving out one part of the
-    drive after another (Efron, Stein, Ann. Statist. 9, 1981).
+    Huber, Robust Statistics, 1981, ch. 7.
     """
+    middle, columns = _columns(predicted)
+    scale, level = robust_fit(columns, reading)[0]
+    return Line(float(scale), float(level), middle)
+
+
+def _columns(predicted: Floats) -> tuple[float, Floats]:
     middle = float(np.mean(predicted))
     off = predicted - middle
-    columns = np.column_stack([off, np.ones_like(off)])
-    scale, level = robust_fit(columns, reading)[0]
+    return middle, np.column_stack([off, np.ones_like(off)])
+
+
+def compare(reading: Floats, predicted: Floats) -> Comparison:
+    """Fit the line of `line_of`, and how sure it is.
+
+    Parameters
+    ----------
+    reading, predicted : (m,) in the order of time
+
+    References
+    ----------
+    Standard deviations by leaving out one part of the
+    drive after another (Efron, Stein, Ann. Statist. 9, 1981).
+    """
+    line = line_of(reading, predicted)
+    _, columns = _columns(predicted)
     # Each is fitted anew: which of two clusters of rows is the outlier may depend on one part.
     size = -(-reading.size // BLOCKS)
     begin = (np.arange(BLOCKS) * (reading.size - size)) // (BLOCKS - 1)
-    rows = np.arange(reading.size)
-    others = [(rows < first) | (rows >= first + size) for first in begin.tolist()]
-    left_out = np.array([robust_fit(columns[k], reading[k])[0] for k in others])
+    rows = np.arange(reading.size - size)
+    others = rows + size * (rows >= begin[:, None])
+    left_out = robust_fits(columns[others], reading[others])[0]
     spread = (BLOCKS - 1) / BLOCKS * np.sum((left_out - np.mean(left_out, 0)) ** 2, 0)
     scale_std, level_std = np.sqrt(spread)
-    return Comparison(float(scale), float(scale_std), float(level), float(level_std), middle)
+    return Comparison(line.scale, line.level, line.predicted, float(scale_std), float(level_std))
 
 
 def follow(rows: Rows, witness: Witness, relation: WitnessRelation) -> Following | None:

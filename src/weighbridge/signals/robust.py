@@ -57,10 +57,16 @@ def huber(residual: Floats, scale: float, threshold: float = HUBER) -> Floats:
     -------
     (n,) in (0, 1]; all 1 where the scale is 0 and no residual is left
     """
+    return np.asarray(_hubers(residual, scale, threshold))
+
+
+def _hubers(residual: Floats, scale: Floats | float, threshold: float = HUBER) -> Floats:
+    """Weights as of `huber`, along the last axis, each set of rows by its own scale."""
     size = np.abs(residual)
     # What rounding leaves of a perfect fit is no outlier.
-    limit = threshold * scale + 1e-12 * float(size.max(initial=0.0)) + 1e-300
-    return np.asarray(np.minimum(1.0, limit / np.maximum(size, limit)))
+    limit = threshold * scale + 1e-12 * size.max(axis=-1, initial=0.0) + 1e-300
+    limit = np.asarray(limit)[..., None]
+    return np.asarray(limit / np.maximum(size, limit))
 
 
 def robust_fit(columns: Floats, y: Floats) -> tuple[Floats, Floats]:
@@ -76,19 +82,41 @@ def robust_fit(columns: Floats, y: Floats) -> tuple[Floats, Floats]:
     found : (k,) parameters
     weight : (n,) of the rows
     """
-    size = np.sqrt(np.mean(columns**2, axis=0)) + 1e-300
-    scaled = columns / size
-    ridge = 1e-12 * y.size * np.eye(size.size)
-    weight, found = np.ones_like(y), np.zeros(size.size)
+    found, weight = robust_fits(columns[None], y[None])
+    return found[0], weight[0]
+
+
+def robust_fits(columns: Floats, y: Floats) -> tuple[Floats, Floats]:
+    """Fit many times as `robust_fit` does, each on rows of its own, together.
+
+    Parameters
+    ----------
+    columns : (b, n, k)
+    y : (b, n)
+
+    Returns
+    -------
+    found : (b, k) parameters
+    weight : (b, n) of the rows
+    """
+    size = np.sqrt(np.mean(columns**2, axis=1)) + 1e-300
+    scaled = columns / size[:, None]
+    ridge = 1e-12 * y.shape[1] * np.eye(size.shape[1])
+    weight, found = np.ones_like(y), np.zeros_like(size)
+    left, own, reading = np.arange(len(y)), scaled, y
     for _ in range(_ROUNDS):
-        before = found
-        rows = scaled.T * weight
-        found = np.linalg.solve(rows @ scaled + ridge, rows @ y)
-        residual = y - scaled @ found
-        if np.max(np.abs(found - before)) <= _SETTLED * np.max(np.abs(found)):
-            break
-        weight = huber(residual, spread(residual))
-    return np.asarray(found / size), weight
+        rows = own.swapaxes(1, 2) * weight[left, None]
+        new = np.linalg.solve(rows @ own + ridge, rows @ reading[..., None])[..., 0]
+        change = np.max(np.abs(new - found[left]), axis=1)
+        found[left] = new
+        going = change > _SETTLED * np.max(np.abs(new), axis=1)
+        if not going.all():
+            left, own, reading, new = left[going], own[going], reading[going], new[going]
+            if not left.size:
+                break
+        residual = reading - (own @ new[..., None])[..., 0]
+        weight[left] = _hubers(residual, _NORMAL * np.median(np.abs(residual), axis=1))
+    return found / size, weight
 
 
 def resolution(values: Floats) -> float:
