@@ -49,6 +49,21 @@ def even(drive, length):
     return np.append(np.arange(drive.start, drive.end, length), drive.end + 1.0)
 
 
+def test_steps_of_four_seconds_end_where_those_of_one_do(short, weighing, setup):
+    """A drive does not end with a whole step: what is left is weighed as well."""
+    ends = []
+    for length in (STEP, LONGEST_STEP):
+        scale = wb.LiveScale(
+            weighing.vehicle, setup=replace(setup, step=length), info=weighing.drive.info
+        )
+        scale.update_block({n: (s.time, s.values) for n, s in short.signals.items()})
+        scale.finish()
+        ends.append(scale.weighing())
+    assert ends[1].time == ends[0].time
+    assert ends[1].mass == pytest.approx(ends[0].mass, rel=1e-3)
+    assert ends[1].std == pytest.approx(ends[0].std, rel=1e-2)
+
+
 @settings(max_examples=2, deadline=None, phases=[Phase.explicit, Phase.generate])
 @given(
     lengths=st.lists(st.floats(0.4, 40.0), min_size=1, max_size=12),

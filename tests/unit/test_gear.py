@@ -9,7 +9,7 @@ from tests.noted import refused
 import weighbridge as wb
 from weighbridge.calibration.problem import find_gears
 from weighbridge.signals import Signal
-from weighbridge.vehicle.engine_delay import find_engine_delay
+from weighbridge.vehicle.engine_delay import find_engine_delay, gathered_delay
 from weighbridge.vehicle.gear import (
     detect_gearings,
     idling,
@@ -72,6 +72,14 @@ def test_gears_that_never_pull_leave_the_engine_speed_as_late_as_the_vehicle_spe
     late = find_engine_delay(time, engine, (time, speed), GEARINGS, 0.2)
     assert late == pytest.approx(0.2, abs=1e-3)
     assert find_engine_delay(time[:5], engine[:5], (time, speed), GEARINGS, 0.2) == 0.2
+
+
+def test_a_delay_at_which_nothing_moves_is_no_reason_for_another():
+    """Of 40 samples on the move, fewer than 30 are left at the usual delay of 2 s."""
+    time = np.arange(0.0, 100.0, 0.1)
+    speed = np.where((time > 50.0) & (time < 54.0), 10.0, 0.0)
+    stamps, engine = time[500:540], np.full(40, 150.0)
+    assert gathered_delay(stamps, engine, (time, speed), 2.0) == 2.0
 
 
 def test_gearings_are_found_within_a_percent():

@@ -291,18 +291,8 @@ def find_gears(
         signal = drive.get("engine_speed")
         if signal is None or len(signal) < 30:
             raise refused("calibration.no_engine_speed", drive=drive.name)
-    found = detect_gearings(*_gathered(drives, motions), idle_speed=idle_speed)
-    late = [
-        find_engine_delay(
-            drive.signals["engine_speed"].time,
-            drive.signals["engine_speed"].values,
-            (motion.time, motion.speed),
-            found.gearings,
-            motion.speed_delay,
-        )
-        for drive, motion in zip(drives, motions, strict=True)
-    ]
-    found = detect_gearings(*_engine_and_speed(drives, motions, late), idle_speed=idle_speed)
+    found = detect_gearings(*_aligned(drives, motions), idle_speed=idle_speed)
+    found = detect_gearings(*_aligned(drives, motions, found.gearings), idle_speed=idle_speed)
     told = _told_gears(drives)
     if not told or found.gearings.size <= told:
         return found
@@ -322,20 +312,21 @@ def _stepless(
     """Range of gearings of all the drives together; None where they show no stepless gearbox."""
     if not all(len(drive.get("engine_speed") or ()) for drive in drives):
         return None
-    return stepless_range(*_gathered(drives, motions), idle_speed=idle_speed)
+    return stepless_range(*_aligned(drives, motions), idle_speed=idle_speed)
 
 
-def _gathered(drives: Sequence[Drive], motions: Sequence[Motion]) -> tuple[Floats, Floats, Floats]:
-    """Engine and vehicle speed of all drives at the delays at which their ratios gather most."""
-    late = [
-        gathered_delay(
-            drive.signals["engine_speed"].time,
-            drive.signals["engine_speed"].values,
-            (motion.time, motion.speed),
-            motion.speed_delay,
+def _aligned(
+    drives: Sequence[Drive], motions: Sequence[Motion], gearings: Floats | None = None
+) -> tuple[Floats, Floats, Floats]:
+    """Engine and vehicle speed of all drives, each brought together; gears may be unknown."""
+    late = []
+    for drive, motion in zip(drives, motions, strict=True):
+        engine, seen = drive.signals["engine_speed"], (motion.time, motion.speed)
+        late.append(
+            gathered_delay(engine.time, engine.values, seen, motion.speed_delay)
+            if gearings is None
+            else find_engine_delay(engine.time, engine.values, seen, gearings, motion.speed_delay)
         )
-        for drive, motion in zip(drives, motions, strict=True)
-    ]
     return _engine_and_speed(drives, motions, late)
 
 

@@ -14,6 +14,7 @@ from weighbridge.vehicle.gear import (
     UNSLIPPED,
     effective_gearing,
     predict_gear,
+    ratio_counts,
     steady,
 )
 
@@ -58,9 +59,6 @@ ENOUGH_SHIFTED: Final = 2000
 NARROWER: Final = 0.3
 """Entropy by which the ratios must gather more than at the usual delay [nat]. An engine speed that
 is 2.5 s late has 0.7 to 2.7 to gain in 15 vehicles with gears, by 1 Hz and by 10 Hz."""
-
-BIN: Final = 0.01
-"""Width of the bins in which the logarithms of the ratios are counted [-]."""
 
 
 def find_engine_delay(
@@ -122,8 +120,9 @@ def gathered_delay(
     stamps, engine_speed = stamps[::step], engine_speed[::step]
     entropies = [_entropy(stamps - usual - shift, engine_speed, motion) for shift in SHIFTS]
     best = int(np.argmin(entropies))
-    unshifted = entropies[int(np.argmin(np.abs(SHIFTS)))]
-    return usual + float(SHIFTS[best]) if unshifted - entropies[best] > NARROWER else usual
+    gain = entropies[int(np.argmin(np.abs(SHIFTS)))] - entropies[best]
+    # Infinite where too few rows are left at the usual delay: then none shows more than it.
+    return usual + float(SHIFTS[best]) if NARROWER < gain < np.inf else usual
 
 
 def _entropy(time: Floats, engine_speed: Floats, motion: tuple[Floats, Floats]) -> float:
@@ -133,7 +132,7 @@ def _entropy(time: Floats, engine_speed: Floats, motion: tuple[Floats, Floats]) 
     used = (speed > UNSLIPPED) & (ratio > LOWEST_GEARING) & (ratio < HIGHEST_GEARING)
     if np.count_nonzero(used) < FEWEST:
         return np.inf
-    counts = np.bincount((np.log(ratio[used] / LOWEST_GEARING) / BIN).astype(np.int64))
+    counts = ratio_counts(ratio[used])
     share = counts[counts > 0] / np.count_nonzero(used)
     return float(-np.sum(share * np.log(share)))
 

@@ -215,7 +215,7 @@ class Topics:
             "mdl": "software weighbridge",
             "sw": VERSION,
         }
-        told = {
+        payload = {
             "dev": device,
             "o": origin,
             "cmps": entities,
@@ -224,7 +224,7 @@ class Topics:
         }
         node = f"weighbridge_{self.node}"
         before = [(f"homeassistant/{p}/{node}/{key}/config", b"") for p, key, *_ in rows]
-        return [*before, (f"homeassistant/device/{node}/config", json.dumps(told).encode())]
+        return [*before, (f"homeassistant/device/{node}/config", json.dumps(payload).encode())]
 
 
 def _percent_of(key: str) -> str:
