@@ -74,6 +74,7 @@ def force_balance(
     delay: float | None = None,
     lag: float | None = None,
     signed: bool = True,
+    engine_delay: float | None = None,
     setup: ForceSetup | None = None,
     since: ForceState | None = None,
 ) -> ForceBalance:
@@ -93,6 +94,8 @@ def force_balance(
     lag : time constant of its first-order smoothing; the vehicle's when None [s]
     signed : whether the torque shows what a dragged engine takes; not a load in its place
         does not
+    engine_delay : lateness of the engine speed; that of the setup, or found from this drive, when
+        None [s]
     setup : what a whole drive shows of its force side; found from this drive when None
     since : what earlier rows left, where ``drive`` and ``motion`` hold the last seconds alone
 
@@ -109,7 +112,9 @@ def force_balance(
         delay = vehicle.timing.torque_delay or 0.0
     lag = vehicle.timing.torque_lag if lag is None else lag
     lagged = lagged_motion(motion, lag, since.lagged if since is not None else None)
-    read = _read(drive, vehicle, lagged, source, delay, setup, since)
+    if setup is not None:
+        engine_delay = setup.engine_delay
+    read = _read(drive, vehicle, lagged, source, delay, engine_delay, setup, since)
     table = read.table
     brakes = find_brakes(
         drive, vehicle, motion, source, table,
@@ -170,7 +175,8 @@ def force_rows(
     """
     source = source_signal(drive, vehicle)
     lagged = lagged_motion(motion, vehicle.timing.torque_lag)
-    return _read(drive, vehicle, lagged, source, delay, setup).table
+    engine_delay = setup.engine_delay if setup is not None else None
+    return _read(drive, vehicle, lagged, source, delay, engine_delay, setup).table
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -201,14 +207,15 @@ def _read(
     lagged: Motion,
     source: Signal,
     delay: float,
+    engine_delay: float | None,
     setup: ForceSetup | None,
     since: ForceState | None = None,
 ) -> _Read:
     """Read motion, lagged as the torque is, and torque at the source's stamps less its delay."""
     recorded = source.time
-    known = (setup.gears, setup.engine_delay) if setup is not None else (None, None)
+    gears = setup.gears if setup is not None else None
     ahead = setup.ahead if setup is not None else math.inf
-    at = read_instants(drive, vehicle, lagged, recorded, delay, *known, ahead=ahead)
+    at = read_instants(drive, vehicle, lagged, recorded, delay, gears, engine_delay, ahead=ahead)
     engine_speed, gearing, altitude = at.columns["engine_speed"], at.columns["gearing"], at.altitude
     period = setup.foot.period if setup is not None else None
     air = setup.air if setup is not None else identify_air(drive, altitude)

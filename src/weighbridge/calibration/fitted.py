@@ -81,7 +81,10 @@ def known_std(std: float) -> float | None:
 
 def rebalanced(problem: Problem, vehicle: Vehicle) -> list[ForceBalance]:
     """Balance every drive with a vehicle."""
-    return [force_balance(r.drive, vehicle, r.motion) for r in problem.recordings]
+    return [
+        force_balance(r.drive, vehicle, r.motion, engine_delay=r.engine_delay)
+        for r in problem.recordings
+    ]
 
 
 def learnt_dragged(problem: Problem, vehicle: Vehicle) -> DraggedReading | None:

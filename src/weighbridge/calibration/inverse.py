@@ -7,8 +7,9 @@ averaged over the same windows.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -255,6 +256,43 @@ def fit(drives: list[DriveRows], settings: FitSettings) -> InverseFit:
     TooShort
         Too few usable windows.
     """
+    cuts, total = _cut(drives, settings)
+    scale = torque_per_reading(drives)
+    # The first round is straight: a reading on both sides would explain itself, and where the
+    # motion is noisy the motion would explain nothing.
+    readings = [np.zeros_like(d.regressor) for d in drives]
+    for _ in range(settings.rounds):
+        design = _design(drives, cuts, readings, settings)
+        state = _solve(design, [d.regressor for d in drives], scale, settings)
+        readings = [
+            _fitted(d, columns, state, scale, settings)
+            for d, columns in zip(drives, design.columns, strict=True)
+        ]
+    return _unpack(state, scale, _extra(settings), total)
+
+
+def log_likelihoods(
+    drives: list[DriveRows],
+    readings: Sequence[Sequence[Floats]],
+    scale: float,
+    settings: FitSettings,
+) -> list[float]:
+    """Log-likelihoods of a straight fit to each of several readings of the same rows.
+
+    Parameters
+    ----------
+    drives : rows of each drive
+    readings : (n,) of each drive, in place of its own
+    scale : rough torque per unit of reading; likelihoods by one scale can be compared [N m]
+    settings
+    """
+    cuts, _ = _cut(drives, settings)
+    design = _design(drives, cuts, [np.zeros_like(d.regressor) for d in drives], settings)
+    return [float(_solve(design, each, scale, settings).log_likelihood) for each in readings]
+
+
+def _cut(drives: list[DriveRows], settings: FitSettings) -> tuple[list[Windows], int]:
+    """Windows of the rows of each drive, and how many there are; refuse too few."""
     cuts = [windows(d.table.time, d.usable, length=settings.window) for d in drives]
     total = sum(cut.count.size for cut in cuts)
     p = 2 + settings.order + 2 * settings.curved
@@ -263,13 +301,7 @@ def fit(drives: list[DriveRows], settings: FitSettings) -> InverseFit:
             f"only {total} usable stretches of time for {p + 4} parameters; drive longer, with "
             "more starts and in all gears"
         )
-    scale = _torque_per_reading(drives)
-    # The first round is straight: a reading on both sides would explain itself, and where the
-    # motion is noisy the motion would explain nothing.
-    readings = [np.zeros_like(d.regressor) for d in drives]
-    for _ in range(settings.rounds):
-        state, readings = _solve(drives, cuts, readings, scale, settings)
-    return _unpack(state, scale, _extra(settings), total)
+    return cuts, total
 
 
 def _extra(settings: FitSettings) -> int:
@@ -277,7 +309,7 @@ def _extra(settings: FitSettings) -> int:
     return 1 + settings.order + 2 * settings.curved + len(settings.knots)
 
 
-def _torque_per_reading(drives: list[DriveRows]) -> float:
+def torque_per_reading(drives: list[DriveRows]) -> float:
     """Rough torque per unit of reading, to make the first coefficient about one [N m]."""
     slopes = []
     for d in drives:
@@ -320,43 +352,77 @@ def _columns(d: DriveRows, reading: Floats, settings: FitSettings) -> Floats:
     return np.asarray(np.nan_to_num(np.column_stack(columns)))
 
 
-def _solve(
-    drives: list[DriveRows],
-    cuts: list[Windows],
-    readings: list[Floats],
-    scale: float,
-    settings: FitSettings,
-) -> tuple[kernel.DisturbanceState, list[Floats]]:
-    """Run the filter over all drives one after another."""
-    mean, std = settings.prior
-    times, rows, targets, variances, parts = [], [], [], [], []
-    clock = 0.0
+class _Design(NamedTuple):
+    """What a fit reads of all drives, one after another, beside the reading of the source.
+
+    Attributes
+    ----------
+    time : (m,) of the windows; between two drives every disturbance fades [s]
+    rows : (m, k) of the states
+    variance : (m,) of the noise [N^2]
+    cuts : windows of each drive
+    gearings : (n,) of each drive, by sample [1/m]
+    columns : (n, k) of each drive, by sample
+    mass : mean of the drives [kg]
+    grade : what no sensor measures of it, in the drive that leaves most [rad]
+    """
+
+    time: Floats
+    rows: Floats
+    variance: Floats
+    cuts: list[Windows]
+    gearings: list[Floats]
+    columns: list[Floats]
+    mass: float
+    grade: float
+
+
+def _design(
+    drives: list[DriveRows], cuts: list[Windows], readings: list[Floats], settings: FitSettings
+) -> _Design:
+    """Average the columns of all drives over their windows."""
     mass = float(np.mean([d.mass for d in drives]))
-    for d, cut, reading in zip(drives, cuts, readings, strict=True):
-        columns = _columns(d, reading, settings)
-        gearing = np.nan_to_num(d.table.gearing)
+    gearings = [np.nan_to_num(d.table.gearing) for d in drives]
+    columns = [_columns(d, each, settings) for d, each in zip(drives, readings, strict=True)]
+    times, variances = [], []
+    clock = 0.0
+    for d, cut, gearing in zip(drives, cuts, gearings, strict=True):
         time = cut.mean(d.table.time)
         times.append(time - time[0] + clock)
-        # Between two drives every disturbance has faded.
         clock = float(times[-1][-1]) + 1e5
-        rows.append(cut.mean(columns))
-        targets.append(cut.mean(scale * gearing * np.nan_to_num(d.regressor)))
         noisy = replace(d.table, force_std=settings.torque_noise * gearing)
         variances.append(noise_variance(noisy, cut, mass, d.motion, settings.window))
-        parts.append(columns)
-    stacked = np.ascontiguousarray(np.vstack(rows))
-    extra = _extra(settings)
-    reached = np.concatenate(targets)
-    gearing = np.concatenate(
-        [cut.mean(np.nan_to_num(d.table.gearing)) for d, cut in zip(drives, cuts, strict=True)]
+    rows = [cut.mean(each) for cut, each in zip(cuts, columns, strict=True)]
+    return _Design(
+        time=np.concatenate(times),
+        rows=np.ascontiguousarray(np.vstack(rows)),
+        variance=np.concatenate(variances),
+        cuts=cuts,
+        gearings=gearings,
+        columns=columns,
+        mass=mass,
+        grade=max(d.motion.unmeasured_grade for d in drives),
     )
+
+
+def _solve(
+    design: _Design,
+    readings: Sequence[Floats],
+    scale: float,
+    settings: FitSettings,
+) -> kernel.DisturbanceState:
+    """Run the filter over all drives one after another."""
+    mean, std = settings.prior
+    extra = _extra(settings)
+    parts = list(zip(design.cuts, design.gearings, readings, strict=True))
+    reached = np.concatenate([cut.mean(scale * g * np.nan_to_num(each)) for cut, g, each in parts])
+    gearing = np.concatenate([cut.mean(g) for cut, g, _ in parts])
     torque = float(np.percentile(reached / np.maximum(gearing, 1e-3), 98.0))
     terms = terms_covariance(settings.bounds, settings, torque, torque / scale)
-    grade = GRAVITY * max(d.motion.unmeasured_grade for d in drives)
     fading = np.array(
         [
-            mass * float(np.hypot(DISTURBANCE_STD, grade)),
-            mass * RESISTANCE_STD,
+            design.mass * float(np.hypot(DISTURBANCE_STD, GRAVITY * design.grade)),
+            design.mass * RESISTANCE_STD,
             WIND_STD * mean[0],
             WIND_STD * mean[0],
             settings.cold_torque_std * torque,
@@ -372,16 +438,24 @@ def _solve(
     )
     start = kernel.initial_state(x0, prior, 0.0)  # type: ignore[no-untyped-call]
     state, _, _, _, _ = kernel.run(
-        start, np.concatenate(times), stacked, reached,
-        np.concatenate(variances), np.zeros(stacked.shape), params,
+        start, design.time, design.rows, reached,
+        design.variance, np.zeros(design.rows.shape), params,
     )  # fmt: skip
-    fitted = []
-    for d, columns in zip(drives, parts, strict=True):
-        gearing = np.nan_to_num(d.table.gearing)
-        predicted = columns[:, : 5 + extra] @ state.x[: 5 + extra]
-        safe = np.maximum(gearing, 1e-3)
-        fitted.append(np.where(gearing > 0.0, predicted / (scale * safe), d.regressor))
-    return state, fitted
+    return state  # type: ignore[no-any-return]
+
+
+def _fitted(
+    d: DriveRows,
+    columns: Floats,
+    state: kernel.DisturbanceState,
+    scale: float,
+    settings: FitSettings,
+) -> Floats:
+    """Reading that the state makes of the columns of a drive (n,)."""
+    gearing = np.nan_to_num(d.table.gearing)
+    known = 5 + _extra(settings)
+    predicted = columns[:, :known] @ state.x[:known]
+    return np.where(gearing > 0.0, predicted / (scale * np.maximum(gearing, 1e-3)), d.regressor)
 
 
 def _unpack(state: kernel.DisturbanceState, scale: float, extra: int, total: int) -> InverseFit:

@@ -27,6 +27,8 @@ from weighbridge.calibration.inverse import (
     TooShort,
     fit,
     fit_with_gusts,
+    log_likelihoods,
+    torque_per_reading,
 )
 from weighbridge.calibration.problem import Problem
 from weighbridge.calibration.recording import DelayedRows
@@ -150,7 +152,8 @@ def _likeliest(problem: Problem) -> tuple[Fitted, Floats]:
     settings = _settings(problem, _rough_noise(problem, rough))
     quick = replace(settings, window=_timing_window(problem), rounds=1)
     quick = replace(quick, torque_noise=_noise(problem, rough, quick))
-    delay, lag, identified, search = find_timing(_Misfits(problem, quick))
+    scale = torque_per_reading(_drive_rows(problem, rough))
+    delay, lag, identified, search = find_timing(_Misfits(problem, quick, scale))
 
     check_delay(problem, delay)
     timing = Timing(torque_delay=delay, torque_lag=lag)
@@ -320,21 +323,30 @@ class _Misfits:
     Attributes
     ----------
     problem, settings
+    scale : torque per unit of reading, the same for all pairs [N m]
     """
 
     problem: Problem
     settings: FitSettings
+    scale: float
 
     def __call__(self, pairs: Sequence[tuple[float, float]]) -> Floats:
         drives = [list(r.search(pairs, LAGS[-1], USUAL_LAG)) for r in self.problem.recordings]
         shared = [np.logical_and.reduce([rows.usable for rows in tried]) for tried in drives]
-        misfits = []
-        for k in range(len(pairs)):
+        misfits = np.empty(len(pairs))
+        # Rows of one delay differ by their reading alone.
+        for delay in {delay for delay, _ in pairs}:
+            of_delay = [k for k, (each, _) in enumerate(pairs) if each == delay]
             rows = [
-                replace(tried[k], usable=use) for tried, use in zip(drives, shared, strict=True)
+                replace(tried[of_delay[0]], usable=use)
+                for tried, use in zip(drives, shared, strict=True)
             ]
-            misfits.append(-fit(_drive_rows(self.problem, rows), self.settings).log_likelihood)
-        return np.array(misfits)
+            readings = [[tried[k].reading for tried in drives] for k in of_delay]
+            given = _drive_rows(self.problem, rows)
+            misfits[of_delay] = np.negative(
+                log_likelihoods(given, readings, self.scale, self.settings)
+            )
+        return misfits
 
 
 def _prior(vehicle: Vehicle, known: Driveline) -> tuple[Floats, Floats]:
@@ -378,7 +390,8 @@ def find_timing(
     total = float(totals[min(lowest, key=lambda k: scores[k])]) if lowest else USUAL_DELAY
 
     tried = total + np.array(SHIFTS)
-    pairs = [(float(t) - lag, lag) for lag in LAGS for t in tried]
+    # Rounded, so that one delay is one.
+    pairs = [(round(float(t) - lag, 9), lag) for lag in LAGS for t in tried]
     by_lag = misfits(pairs).reshape(len(LAGS), len(SHIFTS))
     lowest_at = [_lowest(tried, each) for each in by_lag]
     lags = np.array(LAGS)

@@ -113,8 +113,9 @@ class Recording:
             stamps = self.source.carrier(self.drive).time
             stand_in = stand_in.with_signals(Signal("engine_torque", stamps, self.reading))
         return force_balance(
-            stand_in, self.draft, self.motion, delay=delay, lag=lag, signed=self.source.signed
-        )
+            stand_in, self.draft, self.motion, delay=delay, lag=lag,
+            signed=self.source.signed, engine_delay=self.engine_delay,
+        )  # fmt: skip
 
     def rows(self, delay: float, lag: float = 0.0) -> DelayedRows:
         """Return the rows of a whole balance at a delay and a lag [s]."""

@@ -114,8 +114,8 @@ def _lateness(read: Floats, derivative: Floats, valid: Bools, rate: float) -> fl
     a, b = lowpass(a, rate, band), lowpass(b, rate, band)
     most = int(1.0 * rate)
     shifts = np.arange(-most, most + 1)
-    middle = slice(most, a.size - most)
-    scores = np.array([np.dot(a[middle], np.roll(b, -k)[middle]) for k in shifts])
+    middle = a[most : a.size - most]
+    scores = np.array([np.dot(middle, b[most + k :][: middle.size]) for k in shifts])
     best = int(np.argmax(scores))
     scale = float(np.sqrt(np.dot(a, a) * np.dot(b, b)))
     if best in (0, shifts.size - 1) or scale == 0.0 or scores[best] < 0.5 * scale:

@@ -48,8 +48,15 @@ THINNED: Final = 0.1
 LEVEL_STD: Final = 1.0
 """Standard deviation of the logarithms of these values before the drive has shown [-]."""
 
-_FARTHEST: Final = 8.0 * LEVEL_STD
-"""Logarithms are sought up to here [-]."""
+_FARTHEST: Final = 4.0 * LEVEL_STD
+"""Logarithms are sought up to here [-]. Of values that never change the likeliest noise is none,
+and a filter divides by it."""
+
+_CLOSE: Final = 0.01
+"""The search ends where a step gains less of the logarithm of the likelihood [-]."""
+
+_STEP: Final = 1e-4
+"""Of the logarithms, by which its slopes are found [-]."""
 
 
 def _stride(time: Floats) -> int:
@@ -97,7 +104,6 @@ def _smooth_likeliest(
     measured: tuple[Floats, Floats],
     time: Floats,
     levels: int,
-    **options: float,
 ) -> tuple[Floats, Floats]:
     """Smooth measurements by the sizes of noise and process that are likeliest.
 
@@ -108,7 +114,6 @@ def _smooth_likeliest(
     measured : stamps [s] and values (j,)
     time : (n,) instants asked for, rising [s]
     levels : sizes that are sought
-    options : of the search
 
     Returns
     -------
@@ -119,15 +124,16 @@ def _smooth_likeliest(
     thin = stamps[::stride]
 
     def misfit(level: Floats) -> float:
+        """Of one measurement: so the first step of the search is of the size of the levels."""
         transition, cov, noise, start, spread = model(thin, level)
         var = np.full(thin.size, noise)
         likelihood = rts.log_likelihood(transition, cov, row, values[::stride], var, start, spread)
-        return float(-likelihood + 0.5 * np.sum((level / LEVEL_STD) ** 2))
+        return float(-likelihood + 0.5 * np.sum((level / LEVEL_STD) ** 2)) / thin.size
 
-    # Of values that never change the likeliest noise is none, and a filter divides by it.
-    bounds = [(-_FARTHEST, _FARTHEST)] * levels
-    begin = np.zeros(levels)
-    found = minimize(misfit, begin, method="Nelder-Mead", bounds=bounds, options=options).x
+    found = minimize(
+        misfit, np.zeros(levels), method="L-BFGS-B", bounds=[(-_FARTHEST, _FARTHEST)] * levels,
+        options={"ftol": _CLOSE / thin.size, "eps": _STEP},
+    ).x  # fmt: skip
     clock, z, at = _merged(stamps, values, time)
     transition, cov, noise, start, spread = model(clock, found)
     x, var = rts.smooth(transition, cov, row, z, np.full(clock.size, noise), start, spread)
@@ -167,7 +173,7 @@ def smooth_speed(speed: Signal, time: Floats) -> tuple[Floats, Floats, Floats, F
         start = np.array([speed.values[0], 0.0])
         return transition, cov, noise**2, start, np.diag([noise**2, std**2])
 
-    x, var = _smooth_likeliest(model, row, (speed.time, speed.values), time, 3, xatol=0.02)
+    x, var = _smooth_likeliest(model, row, (speed.time, speed.values), time, 3)
     std = np.sqrt(np.maximum(var, 0.0))
     return x[:, 0], x[:, 1], std[:, 0], std[:, 1]
 
@@ -215,8 +221,7 @@ def smooth_height(
         start = np.array([values[0], 0.0, 0.0])
         return transition, cov, noise**2, start, np.diag([1e4, std**2, walk**2])
 
-    options = {"xatol": 0.05, "maxiter": 300}
-    x, var = _smooth_likeliest(model, row, (stamps, values), time, 5, **options)
+    x, var = _smooth_likeliest(model, row, (stamps, values), time, 5)
     return x[:, 0], x[:, 1], np.sqrt(np.maximum(var[:, 1], 0.0))
 
 
@@ -248,5 +253,5 @@ def smooth_grade(measured: Signal, time: Floats, distance: Floats) -> tuple[Floa
         return transition, cov, noise**2, np.zeros(2), np.diag([0.0, std**2])
 
     stamps, values = measured.time, measured.values
-    x, var = _smooth_likeliest(model, row, (stamps, values), time, 3, xatol=0.05)
+    x, var = _smooth_likeliest(model, row, (stamps, values), time, 3)
     return x[:, 1], np.sqrt(np.maximum(var[:, 1], 0.0))
