@@ -7,10 +7,9 @@ from typing import Final
 
 import numpy as np
 
-from weighbridge.balance.foot_setup import near
 from weighbridge.balance.force_balance import force_balance, force_rows
 from weighbridge.balance.law import force_on_mass
-from weighbridge.balance.table import ForceBalance
+from weighbridge.balance.table import ForceBalance, ForceTable
 from weighbridge.navigation.motion import Motion
 from weighbridge.signals import Drive, Floats
 from weighbridge.signals.correlation import correlation, correlations
@@ -269,17 +268,22 @@ def _misfit(
     begun: ForceBalance | None = None,
 ) -> Callable[[float], float]:
     """One less the correlation of force and specific force, over rows usable at all ``delays``."""
-    if begun is None or begun.delay not in delays:
-        nearest = float(delays[np.argmin(np.abs(delays))])
-        begun = force_balance(drive, vehicle, motion, delay=nearest)
-    first, setup = begun.table, begun.setup
+    views: dict[float, ForceTable] = {}
+    setup = None
+    for delay in sorted(map(float, delays), key=abs):
+        if setup is None and begun is not None and begun.delay == delay:
+            balance = begun
+        else:
+            balance = force_balance(drive, vehicle, motion, delay=delay, setup=setup)
+        views[delay], setup = balance.table, balance.setup
     # Rows that come and go with the delay would make its misfit rough.
-    reach = float(np.max(np.abs(delays - begun.delay)))
-    common = first.usable & ~near(first.time, ~first.usable, first.time, reach)
+    common = np.logical_and.reduce(
+        [table.usable & np.isfinite(table.traction_force) for table in views.values()]
+    )
 
     def misfit(delay: float) -> float:
-        table = first
-        if delay != begun.delay:
+        table = views.get(delay)
+        if table is None:
             table = force_rows(drive, vehicle, motion, delay, setup)
         rows = common & np.isfinite(table.traction_force) & np.isfinite(table.specific_force)
         if np.count_nonzero(rows) < 100:

@@ -257,7 +257,7 @@ def fit(drives: list[DriveRows], settings: FitSettings) -> InverseFit:
         Too few usable windows.
     """
     cuts, total = _cut(drives, settings)
-    scale = torque_per_reading(drives)
+    scale = _torque_per_reading(drives)
     # The first round is straight: a reading on both sides would explain itself, and where the
     # motion is noisy the motion would explain nothing.
     readings = [np.zeros_like(d.regressor) for d in drives]
@@ -272,10 +272,7 @@ def fit(drives: list[DriveRows], settings: FitSettings) -> InverseFit:
 
 
 def log_likelihoods(
-    drives: list[DriveRows],
-    readings: Sequence[Sequence[Floats]],
-    scale: float,
-    settings: FitSettings,
+    drives: list[DriveRows], readings: Sequence[Sequence[Floats]], settings: FitSettings
 ) -> list[float]:
     """Log-likelihoods of a straight fit to each of several readings of the same rows.
 
@@ -283,12 +280,16 @@ def log_likelihoods(
     ----------
     drives : rows of each drive
     readings : (n,) of each drive, in place of its own
-    scale : rough torque per unit of reading; likelihoods by one scale can be compared [N m]
     settings
     """
     cuts, _ = _cut(drives, settings)
     design = _design(drives, cuts, [np.zeros_like(d.regressor) for d in drives], settings)
-    return [float(_solve(design, each, scale, settings).log_likelihood) for each in readings]
+    found = []
+    for each in readings:
+        read = [replace(d, regressor=reading) for d, reading in zip(drives, each, strict=True)]
+        state = _solve(design, each, _torque_per_reading(read), settings)
+        found.append(float(state.log_likelihood))
+    return found
 
 
 def _cut(drives: list[DriveRows], settings: FitSettings) -> tuple[list[Windows], int]:
@@ -309,7 +310,7 @@ def _extra(settings: FitSettings) -> int:
     return 1 + settings.order + 2 * settings.curved + len(settings.knots)
 
 
-def torque_per_reading(drives: list[DriveRows]) -> float:
+def _torque_per_reading(drives: list[DriveRows]) -> float:
     """Rough torque per unit of reading, to make the first coefficient about one [N m]."""
     slopes = []
     for d in drives:

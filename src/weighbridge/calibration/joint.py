@@ -28,7 +28,6 @@ from weighbridge.calibration.inverse import (
     fit,
     fit_with_gusts,
     log_likelihoods,
-    torque_per_reading,
 )
 from weighbridge.calibration.problem import Problem
 from weighbridge.calibration.recording import DelayedRows
@@ -152,8 +151,7 @@ def _likeliest(problem: Problem) -> tuple[Fitted, Floats]:
     settings = _settings(problem, _rough_noise(problem, rough))
     quick = replace(settings, window=_timing_window(problem), rounds=1)
     quick = replace(quick, torque_noise=_noise(problem, rough, quick))
-    scale = torque_per_reading(_drive_rows(problem, rough))
-    delay, lag, identified, search = find_timing(_Misfits(problem, quick, scale))
+    delay, lag, identified, search = find_timing(_Misfits(problem, quick))
 
     check_delay(problem, delay)
     timing = Timing(torque_delay=delay, torque_lag=lag)
@@ -323,12 +321,10 @@ class _Misfits:
     Attributes
     ----------
     problem, settings
-    scale : torque per unit of reading, the same for all pairs [N m]
     """
 
     problem: Problem
     settings: FitSettings
-    scale: float
 
     def __call__(self, pairs: Sequence[tuple[float, float]]) -> Floats:
         drives = [list(r.search(pairs, LAGS[-1], USUAL_LAG)) for r in self.problem.recordings]
@@ -343,9 +339,7 @@ class _Misfits:
             ]
             readings = [[tried[k].reading for tried in drives] for k in of_delay]
             given = _drive_rows(self.problem, rows)
-            misfits[of_delay] = np.negative(
-                log_likelihoods(given, readings, self.scale, self.settings)
-            )
+            misfits[of_delay] = np.negative(log_likelihoods(given, readings, self.settings))
         return misfits
 
 
