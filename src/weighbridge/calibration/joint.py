@@ -331,8 +331,9 @@ class _Misfits:
         shared = [np.logical_and.reduce([rows.usable for rows in tried]) for tried in drives]
         misfits = np.empty(len(pairs))
         # Rows of one delay differ by their reading alone.
-        for delay in {delay for delay, _ in pairs}:
-            of_delay = [k for k, (each, _) in enumerate(pairs) if each == delay]
+        nearly = np.array([round(delay, 9) for delay, _ in pairs])
+        for delay in np.unique(nearly):
+            of_delay = np.flatnonzero(nearly == delay)
             rows = [
                 replace(tried[of_delay[0]], usable=use)
                 for tried, use in zip(drives, shared, strict=True)
@@ -384,8 +385,7 @@ def find_timing(
     total = float(totals[min(lowest, key=lambda k: scores[k])]) if lowest else USUAL_DELAY
 
     tried = total + np.array(SHIFTS)
-    # Rounded, so that one delay is one.
-    pairs = [(round(float(t) - lag, 9), lag) for lag in LAGS for t in tried]
+    pairs = [(float(t) - lag, lag) for lag in LAGS for t in tried]
     by_lag = misfits(pairs).reshape(len(LAGS), len(SHIFTS))
     lowest_at = [_lowest(tried, each) for each in by_lag]
     lags = np.array(LAGS)

@@ -153,13 +153,14 @@ class Recording:
         late = first_order(self.source.carrier(self.drive).time, self.reading, longest)
         moved: dict[float, DelayedRows] = {}
         for delay, lag in pairs:
-            if delay not in moved:
+            nearly = round(delay, 9)
+            if nearly not in moved:
                 rows = self._moved(self._anchor(delay, anchor_lag), motion, delay)
                 settled = since(rows.table.time, ~rows.usable) > FORGOTTEN * longest
-                moved[delay] = replace(rows, usable=rows.usable & settled)
+                moved[nearly] = replace(rows, usable=rows.usable & settled)
             share = lag / longest
             reading = share * self.reading + (1.0 - share) * late
-            yield replace(moved[delay], reading=reading)
+            yield replace(moved[nearly], reading=reading)
 
     def _anchor(self, delay: float, lag: float) -> ForceBalance:
         """Return the balance at the nearest anchor of a delay [s]."""
