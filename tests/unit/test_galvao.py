@@ -10,7 +10,7 @@ from weighbridge.balance.law import STANDARD_DENSITY, needed_force, rotating_mas
 from weighbridge.constants import GRAVITY
 from weighbridge.errors import ConfigError
 from weighbridge.estimators.settings import changed, parsed
-from weighbridge.papers import PAPERS, galvao
+from weighbridge.papers import PAPERS, galvao, galvao_drives, galvao_torque
 from weighbridge.papers.galvao_bounds import (
     FAST,
     SHEET,
@@ -33,9 +33,21 @@ from weighbridge.papers.galvao_torque import (
 )
 from weighbridge.vehicle.air import dynamic_pressure
 
+PAPERS_DURATION = galvao_drives.DURATION
+BRIEF = 600.0
+"""Of a drive of these tests [s]."""
+
+
+@pytest.fixture(scope="module", autouse=True)
+def brief():
+    """Half the paper's time is enough to see what its drives show."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(galvao_drives, "DURATION", BRIEF)
+        yield
+
 
 @pytest.fixture(scope="module")
-def three():
+def three(brief):
     return galvao.weigh_three(1234)
 
 
@@ -75,16 +87,17 @@ def done(three):
 
 def test_the_paper_is_known_to_reproduce():
     assert PAPERS["galvao"] == galvao.__name__
+    assert PAPERS_DURATION == 1200.0
 
 
 def test_the_road_is_easy_and_the_drives_are_as_long_as_the_papers(three):
     _, drives, tests = three
     for made, test in zip(drives, tests, strict=True):
         assert set(made.drive.signals) == {"vehicle_speed"}
-        assert made.drive.duration == pytest.approx(1200.0, abs=15.0)
+        assert made.drive.duration == pytest.approx(BRIEF, abs=15.0)
         assert np.std(made.truth.grade) < 0.01
         assert test.mass == pytest.approx(1092.0, abs=2.0)
-        assert np.count_nonzero(test.ours.used) > 100
+        assert np.count_nonzero(test.ours.used) > 0.58 * BRIEF / 7.0
 
 
 def test_same_mass_is_met_from_its_own_start_and_not_from_the_printed_one(three):
@@ -102,17 +115,14 @@ def test_a_setting_of_the_printed_filter_moves_it_alone(three):
         assert abs(usual.printed.mass[-1] - other.printed.mass[-1]) > 10.0
 
     given = {
-        "sampling.sample_time": 14.0, "model.drag": 0.5, "printed.groups": 1, "printed.tail": 1.0,
-    }  # fmt: skip
-    given = {
-        "sampling.sample_time": 14.0,
+        "sampling.sample_time": 10.0,
         "model.drag": 0.5,
         "printed.groups": 1,
         "printed.tail": 1.0,
     }
     settings = changed(galvao.Settings(), given)
     fitted = settings.fitted(three[1][0])
-    assert fitted.vehicle.speed_model.sample_time == 14.0
+    assert fitted.vehicle.speed_model.sample_time == 10.0
     assert fitted.vehicle.speed_model.drag == 0.5
     other = changed(galvao.Settings(), {"printed.groups": 1, "printed.tail": 1.0})
     run = galvao.run_filter(three[2][1].balance, three[0].vehicle, other.printed)
@@ -187,8 +197,11 @@ def test_page_begins_with_the_papers_figures(done, tmp_path, monkeypatch):
 
 
 @pytest.fixture(scope="module")
-def trial():
-    return torque_trial(1234, galvao.easy_route(1234))
+def trial(brief):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(galvao_torque, "LOADS", (0.0, 200.0, 400.0))
+        patch.setattr(galvao_drives, "DURATION", 400.0)
+        return torque_trial(1234, galvao.easy_route(1234))
 
 
 def test_recorded_torque_weighs_the_load_where_speed_alone_does_not(trial):
@@ -197,15 +210,6 @@ def test_recorded_torque_weighs_the_load_where_speed_alone_does_not(trial):
     gain = np.polyfit(trial.masses, trial.ways[by_map].mass, 1)[0]
     assert gain == pytest.approx(1.0, abs=0.15)
     assert trial.slope(by_map)[0] == pytest.approx(gain)
-
-
-def test_a_calibration_that_knows_more_of_the_grade_than_the_drive_widens_the_interval(trial):
-    _, alike, mixed = WAYS
-    # Drives that no calibration saw.
-    by_alike, by_mixed = (np.mean(trial.errors(way)[1:]) for way in (alike, mixed))
-    # Deming's regression takes most of it out: 10 % before, and its interval knows.
-    assert abs(by_mixed - by_alike) < 0.05
-    assert np.all(trial.ways[mixed].std > 1.5 * trial.ways[alike].std)
 
 
 def test_errors_of_recorded_torque_are_told(done):
