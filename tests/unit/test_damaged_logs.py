@@ -137,7 +137,7 @@ def fault_of(child):
 
 @pytest.mark.parametrize("suffix", LOGS)
 @settings(
-    max_examples=40,
+    max_examples=20,
     deadline=None,
     derandomize=True,
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
@@ -151,7 +151,7 @@ def test_damaged_files(suffix, fault_of, tmp_path, damage):
 
 @pytest.mark.parametrize("name", TABLES)
 @settings(
-    max_examples=25,
+    max_examples=12,
     deadline=None,
     derandomize=True,
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
@@ -165,7 +165,7 @@ def test_damaged_tables(name, fault_of, tmp_path, damage):
 
 @pytest.mark.parametrize("suffix", LOGS)
 @settings(
-    max_examples=15,
+    max_examples=10,
     deadline=None,
     derandomize=True,
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],

@@ -8,7 +8,7 @@ from numba import config
 import weighbridge as wb
 from weighbridge.messages import Problem
 from weighbridge.signals import Signal
-from weighbridge.simulation import make_scenario, simulate_car
+from weighbridge.simulation import Sensors, make_scenario, simulate_car
 
 pytestmark = pytest.mark.skipif(
     bool(config.DISABLE_JIT), reason="whole drives take minutes without the compiler"
@@ -18,7 +18,8 @@ pytestmark = pytest.mark.skipif(
 @pytest.fixture(scope="module", params=[("van-calibration", 71), ("compact-calibration", 72)])
 def made(request):
     name, seed = request.param
-    return simulate_car(replace(make_scenario(name, seed=seed), duration=1500.0))
+    scenario = replace(make_scenario(name, seed=seed), sensors=Sensors(imu_rate=50.0))
+    return simulate_car(replace(scenario, duration=1500.0))
 
 
 def scaled(drive, gain):

@@ -47,7 +47,7 @@ def read(made, rng):
 def driven():
     """Return a car's drives, known and loaded, with their readings, by kind."""
     found = {}
-    for k, kind in enumerate(("petrol_dct", "electric")):
+    for k, (kind, duration) in enumerate((("petrol_dct", 800.0), ("electric", 1200.0))):
         rng = np.random.default_rng([71, k])
         car = random_vehicle(rng, kind)
         polling = replace(usual_polling(car), fast=("vehicle_speed", "engine_speed"), rate=5.0)
@@ -56,7 +56,7 @@ def driven():
             scenario = make_scenario(name, payload=load, seed=810 + 10 * k + j)
             sensors = replace(scenario.sensors, imu_rate=50.0)
             made = simulate_car(
-                replace(scenario, car=car, polling=polling, sensors=sensors, duration=1200.0)
+                replace(scenario, car=car, polling=polling, sensors=sensors, duration=duration)
             )
             drives.append((made, read(made, rng)))
         found[kind] = drives

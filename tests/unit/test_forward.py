@@ -18,22 +18,27 @@ from weighbridge.navigation.select import scaled_for_navigation
 from weighbridge.pipeline.forward import forward_weigh, identify_forward, lateness
 from weighbridge.signals import Signal
 from weighbridge.signals.recent import STEP, instants, recent
-from weighbridge.simulation import MIDSIZE, Scenario, short_route, simulate_car
+from weighbridge.simulation import MIDSIZE, Scenario, Sensors, short_route, simulate_car
 from weighbridge.vehicle.model import TorqueModel
 
 COLUMNS = tuple(f.name for f in fields(ForceTable) if f.name not in ("set_off", "ratio_rate"))
 
 
+def driven(name, seed, **more):
+    sensors = Sensors(imu_rate=50.0)
+    return simulate_car(
+        Scenario(name=name, car=MIDSIZE, route=short_route(), seed=seed, sensors=sensors, **more)
+    )
+
+
 @pytest.fixture(scope="module")
 def made():
-    return simulate_car(Scenario(name="forward", car=MIDSIZE, route=short_route(), seed=42_001))
+    return driven("forward", 42_001)
 
 
 @pytest.fixture(scope="module")
 def loaded():
-    return simulate_car(
-        Scenario(name="loaded", car=MIDSIZE, route=short_route(), payload=250.0, seed=42_002)
-    )
+    return driven("loaded", 42_002, payload=250.0)
 
 
 @pytest.fixture(scope="module")

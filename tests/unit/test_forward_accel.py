@@ -73,7 +73,7 @@ def simulated(name, seed, payload, duration):
 
 @pytest.fixture(scope="module")
 def car():
-    known, mass = simulated("car-calibration", 741, 0.0, 1500.0)
+    known, mass = simulated("car-calibration", 741, 0.0, 1000.0)
     return wb.calibrate([known], mass=mass)
 
 
@@ -108,7 +108,7 @@ def test_a_torque_that_changes_its_scale_is_refused_or_told_without_a_gyroscope(
 
 
 def test_a_torque_that_changes_its_scale_is_refused_or_told_by_speed():
-    known, mass = simulated("car-calibration", 741, 0.0, 1500.0)
+    known, mass = simulated("car-calibration", 741, 0.0, 1000.0)
     by_speed = replace(wb.calibrate([known.without(*AXES)], mass=mass), witnesses=())
     drive, _ = simulated("car", 742, 260.0, 1200.0)
     drive = drive.without(*AXES)

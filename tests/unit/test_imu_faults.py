@@ -1,6 +1,7 @@
 """Faults of the inertial sensor on the way: moved, mis-scaled, frozen, noisy, slow, clipped."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from weighbridge.navigation.aiding import read_imu
 from weighbridge.navigation.identify.gain import find_gain
 from weighbridge.navigation.inertial import inertial_motion
 from weighbridge.signals import Signal
-from weighbridge.simulation import make_scenario, simulate_car
+from weighbridge.simulation import Sensors, make_scenario, simulate_car
 from weighbridge.vehicle.model import Mounting
 
 pytestmark = pytest.mark.skipif(
@@ -26,9 +27,11 @@ GYRO = ("gyro_x", "gyro_y", "gyro_z")
 MIDDLE = 600.0
 
 
+@cache
 def made_of(name, seed):
     """Drive, and its motion with a squat that is known, as vehicle files have it."""
-    made = simulate_car(replace(make_scenario(name, seed=seed), duration=1200.0))
+    scenario = replace(make_scenario(name, seed=seed), sensors=Sensors(imu_rate=50.0))
+    made = simulate_car(replace(scenario, duration=1200.0))
     free = inertial_motion(made.drive)
     return made.drive, inertial_motion(made.drive, known(free))
 
@@ -247,7 +250,7 @@ def test_an_axis_that_dies_leaves_what_was_before(car):
 
 def test_rounding_is_not_called_frozen(car):
     drive, _ = car
-    rounded = replaced(drive, GYRO, np.round(columns(drive, GYRO) / 0.01) * 0.01)
+    rounded = replaced(drive, GYRO, np.round(columns(drive, GYRO) / 0.005) * 0.005)
     before, after = read_imu(drive), read_imu(rounded)
     assert after.time.size > 0.95 * before.time.size
 
@@ -314,7 +317,7 @@ def test_a_sensor_slower_than_its_table_is_told(car):
     drive, _ = car
     for names in (ACCEL, GYRO):
         values = columns(drive, names)
-        drive = replaced(drive, names, values[np.arange(values.shape[0]) // 60 * 60])
+        drive = replaced(drive, names, values[np.arange(values.shape[0]) // 15 * 15])
     with refused("imu.slow"):
         inertial_motion(drive)
 

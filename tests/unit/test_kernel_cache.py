@@ -61,20 +61,9 @@ def install(folder):
     return run
 
 
-def test_an_edit_of_a_called_kernel_is_noticed(tmp_path, monkeypatch):
+def test_installations_of_the_same_sources_share_a_folder(tmp_path, monkeypatch):
+    """An edit of a kernel that is called is noticed, and each finds its own again."""
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "kept"))
-    run = install(tmp_path)
-    assert run(2.0) == (7.0, 0)
-    assert run(2.0) == (7.0, 1)
-    assert run(5.0) == (16.0, 0)
-
-
-@pytest.mark.parametrize("variable", ["NUMBA_CACHE_DIR", "HOME"])
-def test_installations_of_the_same_sources_share_a_folder(variable, tmp_path, monkeypatch):
-    """The one that is named, or else the user's cache folder."""
-    for name in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME"):
-        monkeypatch.delenv(name, raising=False)
-    monkeypatch.setenv(variable, str(tmp_path / "kept"))
     checkout, wheel = install(tmp_path / "checkout"), install(tmp_path / "wheel")
     assert checkout(2.0) == (7.0, 0)
     assert wheel(2.0) == (7.0, 1)
@@ -82,6 +71,15 @@ def test_installations_of_the_same_sources_share_a_folder(variable, tmp_path, mo
     # What the other sources need is still there.
     assert checkout(2.0) == (7.0, 1)
     assert not list((tmp_path / "wheel").rglob("*.nbc"))
+
+
+def test_without_a_named_folder_it_is_in_the_users_cache(tmp_path, monkeypatch):
+    for name in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("HOME", str(tmp_path / "kept"))
+    assert install(tmp_path / "checkout")(2.0) == (7.0, 0)
+    assert list((tmp_path / "kept").rglob("*.nbc"))
+    assert not list((tmp_path / "checkout").rglob("*.nbc"))
 
 
 def test_processes_that_save_at_once_do_not_mix_signatures(tmp_path, monkeypatch):

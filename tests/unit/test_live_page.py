@@ -6,6 +6,7 @@ import json
 import math
 import re
 import threading
+from dataclasses import replace
 from importlib.resources import files
 
 import pytest
@@ -24,6 +25,13 @@ STATIC = files("weighbridge.live.outputs") / "static"
 
 @pytest.fixture
 def page():
+    with contextlib.closing(Page(port=0)) as served:
+        yield served
+
+
+@pytest.fixture(scope="module")
+def still():
+    """A page that is told nothing."""
     with contextlib.closing(Page(port=0)) as served:
         yield served
 
@@ -61,23 +69,23 @@ def news(response):
 # What is handed out
 
 
-def test_everything_the_page_names_is_there_and_nothing_of_others(page):
-    status, headers, body = got(page)
+def test_everything_the_page_names_is_there_and_nothing_of_others(still):
+    status, headers, body = got(still)
     assert status == 200
     assert headers["content-type"] == "text/html; charset=utf-8"
     named = re.findall(r'(?:href|src)="([^"]+)"', body)
     assert len(named) == 5
     for path in named:
-        assert got(page, f"/{path}")[0] == 200, path
+        assert got(still, f"/{path}")[0] == 200, path
     for name in ("index.html", "page.css", "page.js"):
         assert "//" not in re.sub(r"(?m)//.*$", "", (STATIC / name).read_text("utf-8")), name
     assert "style=" not in body
     assert not re.search(r"<script>|\son\w+=", body)
 
 
-def test_a_strict_policy_is_in_every_answer(page):
+def test_a_strict_policy_is_in_every_answer(still):
     for path in ("/", "/page.js", "/nothing", "/uplot/uPlot.min.css"):
-        headers = got(page, path)[1]
+        headers = got(still, path)[1]
         policy = headers["content-security-policy"]
         assert policy.startswith("default-src 'none'; script-src 'self'; style-src 'self'")
         assert "unsafe" not in policy
@@ -93,9 +101,9 @@ def test_the_plot_library_has_its_licence_and_version_beside_it():
     assert f"(v{version})" in (STATIC / "uplot" / "uPlot.iife.min.js").read_text()[:100]
 
 
-def test_files_beside_the_page_are_not_handed_out(page):
+def test_files_beside_the_page_are_not_handed_out(still):
     for path in ("/uplot/LICENSE", "/../page.py", "/%2e%2e/page.py", "/uplot/", "/index.html"):
-        assert got(page, path)[0] == 404, path
+        assert got(still, path)[0] == 404, path
 
 
 # What is refused
@@ -105,8 +113,8 @@ def test_files_beside_the_page_are_not_handed_out(page):
     "method", ["POST", "PUT", "DELETE", "PATCH", "OPTIONS", "CONNECT", "TRACE"]
 )
 @pytest.mark.parametrize("path", ["/", "/events", "/tare", "/page.js"])
-def test_no_request_but_get_is_answered(page, method, path):
-    status, headers, _ = got(page, path, method)
+def test_no_request_but_get_is_answered(still, method, path):
+    status, headers, _ = got(still, path, method)
     assert status == 405
     assert headers["allow"] == "GET, HEAD"
 
@@ -123,33 +131,33 @@ def test_no_route_takes_anything_but_get():
 @pytest.mark.parametrize(
     "host", ["evil.example", "evil.example:80", "127.0.0.1.evil.example", "192.168.1.5", "[::2]"]
 )
-def test_a_name_that_is_not_this_machine_is_refused(page, host):
+def test_a_name_that_is_not_this_machine_is_refused(still, host):
     for path in ("/", "/events"):
-        assert got(page, path, host=host)[0] == 421
+        assert got(still, path, host=host)[0] == 421
 
 
 @pytest.mark.parametrize("host", ["localhost", "LOCALHOST:1", "127.0.0.1", "[::1]:8765"])
-def test_names_of_this_machine_are_answered(page, host):
-    assert got(page, host=host)[0] == 200
+def test_names_of_this_machine_are_answered(still, host):
+    assert got(still, host=host)[0] == 200
 
 
-def test_two_names_are_refused(page):
-    assert got(page, headers=[("Host", "evil.example")])[0] in (400, 421)
+def test_two_names_are_refused(still):
+    assert got(still, headers=[("Host", "evil.example")])[0] in (400, 421)
 
 
 def test_on_every_address_addresses_and_own_names_are_answered_and_others_not():
-    with contextlib.closing(Page("0.0.0.0", 0, names=("van.home",))) as page:
+    with contextlib.closing(Page("0.0.0.0", 0, names=("van.home",))) as named:
         for host in ("192.168.1.5", "[fe80::1]:80", "van.home:8765", "localhost"):
-            assert got(page, host=host)[0] == 200, host
-        assert got(page, host="evil.example")[0] == 421
+            assert got(named, host=host)[0] == 200, host
+        assert got(named, host="evil.example")[0] == 421
 
 
 # Uvicorn leaves a socket that could not be bound to the garbage collector.
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 @pytest.mark.filterwarnings("ignore::ResourceWarning")
-def test_a_port_that_is_taken_is_told_in_a_sentence(page):
+def test_a_port_that_is_taken_is_told_in_a_sentence(still):
     with pytest.raises(ConfigError, match="the port is taken"):
-        Page(port=port_of(page))
+        Page(port=port_of(still))
     with pytest.raises(ConfigError, match="cannot be served on 203"):
         Page("203.0.113.7", 0)
 
@@ -194,9 +202,9 @@ def test_closing_ends_the_streams_and_the_thread():
 
 
 def test_points_are_bounded_by_the_window_and_evenly_spaced():
-    history = History()
+    history, one = History(), weighing()
     for k in range(36_000):
-        history.add(weighing(0.1 * k))
+        history.add(replace(one, time=0.1 * k))
         assert len(history) <= MOST
     found = history.since(0)
     assert len(found["time"]) == MOST

@@ -11,7 +11,7 @@ from weighbridge.balance.shaking import shaken
 from weighbridge.checks import mend_drive
 from weighbridge.navigation.select import find_motion
 from weighbridge.signals import Signal
-from weighbridge.simulation import make_scenario, simulate_car
+from weighbridge.simulation import Sensors, make_scenario, simulate_car
 
 pytestmark = pytest.mark.skipif(
     bool(config.DISABLE_JIT), reason="whole drives take minutes without the compiler"
@@ -21,7 +21,8 @@ pytestmark = pytest.mark.skipif(
 @pytest.fixture(scope="module", params=[("car", 86), ("truck", 87)])
 def drive(request):
     name, seed = request.param
-    return simulate_car(replace(make_scenario(name, seed=seed), duration=1000.0)).drive
+    scenario = replace(make_scenario(name, seed=seed), sensors=Sensors(imu_rate=50.0))
+    return simulate_car(replace(scenario, duration=1000.0)).drive
 
 
 def told(drive):

@@ -7,7 +7,7 @@ import pytest
 
 import weighbridge as wb
 from weighbridge.signals import Signal
-from weighbridge.simulation import make_scenario, simulate_car
+from weighbridge.simulation import Sensors, make_scenario, simulate_car
 from weighbridge.vehicle.air import Air, identify_air, standard_pressure
 
 UP = 1600.0
@@ -36,8 +36,9 @@ def lifted(drive, power, height=UP):
 def low():
     """Two drives of one car at 60 m, with their masses."""
     made = [
-        simulate_car(make_scenario("car-short", payload=payload, seed=seed))
+        simulate_car(replace(scenario, sensors=Sensors(imu_rate=50.0)))
         for payload, seed in ((60.0, 71), (330.0, 72))
+        for scenario in [make_scenario("car-short", payload=payload, seed=seed)]
     ]
     return [(m.drive.without(*OTHERS), float(m.truth.mass[0])) for m in made]
 
