@@ -27,7 +27,7 @@ ROOMS = ("simulation", "signals", "vehicle", "kernels")
 UNUSED = 86_400.0
 """After which drives of other sources are thrown away [s]."""
 
-ROOM = 1e9
+ROOM = 2e9
 """Of all drives that are kept [B]; the others are simulated each time."""
 
 

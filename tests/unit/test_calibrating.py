@@ -2,6 +2,7 @@
 
 import tomllib
 from dataclasses import replace
+from functools import cache
 from types import SimpleNamespace
 
 import numpy as np
@@ -31,9 +32,13 @@ pytestmark = pytest.mark.skipif(
 )
 
 
+DURATION = 700.0
+"""Of the drives of the petrol car [s]."""
+
+
 def short(seed, payload=0.0):
     scenario = make_scenario("car-short", payload=payload, seed=seed, without=("warm_up",))
-    return simulate_car(replace(scenario, sensors=Sensors(imu_rate=50.0)))
+    return simulate_car(replace(scenario, sensors=Sensors(imu_rate=50.0), duration=DURATION))
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +53,8 @@ def loaded():
 
 @pytest.fixture(scope="module")
 def electric():
-    return simulate_car(replace(make_scenario("electric", seed=33), duration=900.0)).drive
+    scenario = replace(make_scenario("electric", seed=33), sensors=Sensors(imu_rate=50.0))
+    return simulate_car(replace(scenario, duration=700.0)).drive
 
 
 def with_torque(made):
@@ -58,8 +64,26 @@ def with_torque(made):
 
 
 @pytest.fixture(scope="module")
-def car(empty):
-    return calibrate(empty.drive)
+def fitted(empty):
+    """Calibrate on the empty car by a method, once."""
+    return cache(
+        lambda method: run_calibration(empty.drive, settings=CalibrationSettings(method=method))
+    )
+
+
+@pytest.fixture(scope="module")
+def car(fitted):
+    return fitted("joint").vehicle
+
+
+@pytest.fixture(scope="module")
+def measured(empty):
+    return calibrate(with_torque(empty))
+
+
+@pytest.fixture(scope="module")
+def motor(electric):
+    return calibrate(electric)
 
 
 def test_one_drive_by_load(car, empty):
@@ -76,13 +100,20 @@ def test_the_engine_speed_at_standstill_is_the_idle_speed(car, empty):
     assert car.driveline.idle_speed == pytest.approx(empty.scenario.car.idle_speed, rel=0.03)
 
 
-def test_a_motor_that_stands_has_no_idle_speed(electric):
-    assert calibrate(electric).driveline.idle_speed == 0.0
+def test_a_motor_that_stands_has_no_idle_speed(motor):
+    assert motor.driveline.idle_speed == 0.0
 
 
 def test_it_weighs_its_own_drive_and_another(car, empty, loaded):
-    assert weigh(empty.drive, car).mass == pytest.approx(empty.truth.mass.mean(), rel=0.01)
-    assert weigh(loaded.drive, car).mass == pytest.approx(loaded.truth.mass.mean(), rel=0.05)
+    assert 0.0 <= car.timing.torque_lag <= 0.3
+    assert car.provenance.method == "joint"
+    own = weigh(empty.drive, car)
+    assert own.method == "joint"
+    assert own.mass == pytest.approx(empty.truth.mass.mean(), rel=0.005)
+    other, truth = weigh(loaded.drive, car), float(loaded.truth.mass.mean())
+    low, high = other.interval(0.95)
+    assert low < truth < high
+    assert other.mass == pytest.approx(truth, rel=0.03)
 
 
 def test_drives_of_different_mass_together(empty, loaded):
@@ -95,14 +126,13 @@ def test_drives_of_different_mass_together(empty, loaded):
     assert calibrate(drives).torque.coefficients == both.torque.coefficients
 
 
-def test_measured_torque_is_preferred_and_better(empty):
-    car = calibrate(with_torque(empty))
-    assert car.torque.source == "measured"
-    offset, scale = car.torque.coefficients
+def test_measured_torque_is_preferred_and_better(measured):
+    assert measured.torque.source == "measured"
+    offset, scale = measured.torque.coefficients
     # Torque at the clutch; the driveline takes a few percent of it.
     assert 0.85 < scale < 1.02
     assert abs(offset) < 15.0
-    assert car.provenance.r_squared > 0.97
+    assert measured.provenance.r_squared > 0.97
 
 
 def test_torque_from_air_flow(empty, loaded):
@@ -118,7 +148,8 @@ def test_torque_from_air_flow(empty, loaded):
 def test_a_source_without_a_floor_has_the_range_of_its_readings(empty, monkeypatch, tmp_path):
     every = replace(TORQUE_SOURCES["air_flow"], floor=TORQUE_SOURCES["measured"].floor)
     monkeypatch.setitem(TORQUE_SOURCES._own, "air_flow", every)
-    car = calibrate(empty.drive, settings=CalibrationSettings(source="air_flow"))
+    settings = CalibrationSettings(source="air_flow", method="rls")
+    car = calibrate(empty.drive, settings=settings)
     car.save(tmp_path / "car.toml")
     kept = Vehicle.load(tmp_path / "car.toml").torque
     flow = empty.drive.signals["mass_air_flow"]
@@ -128,8 +159,8 @@ def test_a_source_without_a_floor_has_the_range_of_its_readings(empty, monkeypat
     assert high < 1.05 * np.nanmax(reading)
 
 
-def test_grid_of_table_5_ends_near(empty):
-    car = calibrate(empty.drive, settings=CalibrationSettings(method="rls"))
+def test_grid_of_table_5_ends_near(empty, fitted):
+    car = fitted("rls").vehicle
     grid = calibrate(empty.drive, settings=CalibrationSettings(grid=True, method="rls"))
     assert grid.road_load.drag_area == pytest.approx(car.road_load.drag_area, abs=0.06)
     # Values of Table 5 only.
@@ -140,9 +171,8 @@ def test_grid_of_table_5_ends_near(empty):
 def test_what_lies_on_a_bound_is_told_with_what_it_means():
     # Of an air that brakes nothing the least drag area is still too much.
     slow = replace(make_scenario("car-short", seed=31).car, drag_area=0.02)
-    made = simulate_car(
-        replace(make_scenario("car-short", seed=31, without=("warm_up",)), car=slow)
-    )
+    scenario = replace(make_scenario("car-short", seed=31, without=("warm_up",)), car=slow)
+    made = simulate_car(replace(scenario, sensors=Sensors(imu_rate=50.0), duration=DURATION))
     done = run_calibration(made.drive, settings=CalibrationSettings(method="rls"))
     assert "drag_area" in done.held
     held = next(p for p in done.problems if p.id == "calibration.held")
@@ -151,21 +181,21 @@ def test_what_lies_on_a_bound_is_told_with_what_it_means():
 
 
 def test_straight_regression_has_no_curvature(empty):
-    car = calibrate(empty.drive, settings=CalibrationSettings(order=1, curved=False))
+    settings = CalibrationSettings(order=1, curved=False, method="rls")
+    car = calibrate(empty.drive, settings=settings)
     assert len(car.torque.coefficients) == 3
     assert car.torque.curvature == ()
 
 
-def test_single_speed_electric_car(electric):
-    car = calibrate(electric)
-    assert car.torque.source == "measured"
-    assert car.driveline.single_speed
-    found = weigh(electric, car)
+def test_single_speed_electric_car(electric, motor):
+    assert motor.torque.source == "measured"
+    assert motor.driveline.single_speed
+    found = weigh(electric, motor)
     assert found.mass == pytest.approx(electric.info.mass, rel=0.01)
 
 
-def test_a_motor_that_is_warmer_next_time_is_in_every_mass(electric, monkeypatch):
-    left = calibrate(electric).provenance.mass_scale_std
+def test_a_motor_that_is_warmer_next_time_is_in_every_mass(electric, motor, monkeypatch):
+    left = motor.provenance.mass_scale_std
     # Once for the drive of the calibration, once for the one that is weighed.
     source = replace(TORQUE_SOURCES["measured"], motor_between_std=None)
     monkeypatch.setitem(TORQUE_SOURCES._own, "measured", source)
@@ -173,8 +203,8 @@ def test_a_motor_that_is_warmer_next_time_is_in_every_mass(electric, monkeypatch
     assert left == pytest.approx(np.hypot(without, np.sqrt(2.0) * 0.006), rel=0.02)
 
 
-def test_single_speed_without_engine_speed(electric):
-    known = Vehicle(driveline=Driveline(gearings=calibrate(electric).driveline.gearings))
+def test_single_speed_without_engine_speed(electric, motor):
+    known = Vehicle(driveline=Driveline(gearings=motor.driveline.gearings))
     car = calibrate(electric.without("engine_speed"), vehicle=known)
     assert car.provenance.r_squared > 0.97
 
@@ -183,7 +213,7 @@ def test_measured_gear_signal(empty):
     truth = empty.truth
     told = np.where(truth.phase == 0.0, truth.gear, 0.0)
     drive = empty.drive.with_signals(Signal("gear", truth.time[::5].copy(), told[::5].copy()))
-    car = calibrate(drive)
+    car = calibrate(drive, settings=CalibrationSettings(method="rls"))
     assert weigh(drive, car).mass == pytest.approx(truth.mass.mean(), rel=0.02)
 
 
@@ -211,7 +241,7 @@ def test_gears_that_are_named_and_not_found_are_told(empty):
     assert unfound_gears([empty.drive.without("gear")], 3) is None
 
 
-def test_percent_of_a_reference_torque(empty):
+def test_percent_of_a_reference_torque(empty, measured):
     torque = with_torque(empty).signals["engine_torque"]
     drive = empty.drive.with_signals(
         Signal("engine_torque_fraction", torque.time, torque.values / 250.0)
@@ -221,11 +251,13 @@ def test_percent_of_a_reference_torque(empty):
         calibrate(drive, settings=settings)
     known = Vehicle(torque=TorqueModel(source="percent", reference_torque=250.0))
     car = calibrate(drive, vehicle=known, settings=settings)
-    direct = calibrate(with_torque(empty))
-    assert car.torque.coefficients == pytest.approx(direct.torque.coefficients, rel=1e-3, abs=0.05)
+    assert car.torque.coefficients == pytest.approx(
+        measured.torque.coefficients, rel=1e-3, abs=0.05
+    )
     assert car.torque.told_reference_torque is None
     told = Signal("reference_torque", np.arange(0.0, 60.0, 5.0), np.full(12, 250.0))
-    car = calibrate(drive.with_signals(told), settings=settings)
+    quick = CalibrationSettings(source="percent", method="rls")
+    car = calibrate(drive.with_signals(told), settings=quick)
     assert car.torque.told_reference_torque == 250.0
 
 
@@ -237,9 +269,10 @@ def test_known_speed_scale_stays_where_the_drive_shows_none(empty):
     alone = empty.drive.without(
         *(n for n in empty.drive.signals if n.startswith(("gnss", "lat", "lon", "alt")))
     )
+    quick = CalibrationSettings(method="rls")
     known = Vehicle(driveline=Driveline(speed_scale=1.02))
-    assert calibrate(alone, vehicle=known).driveline.speed_scale == 1.02
-    assert calibrate(alone).driveline.speed_scale == 1.0
+    assert calibrate(alone, vehicle=known, settings=quick).driveline.speed_scale == 1.02
+    assert calibrate(alone, settings=quick).driveline.speed_scale == 1.0
 
 
 @pytest.mark.parametrize("mass", [1.58, 158.0, 1.58e6, -1580.0, float("nan")])
@@ -336,26 +369,6 @@ def test_an_inertia_stated_counts_though_engines_of_cars_have_it(electric, metho
     assert found.driveline.engine_inertia == pytest.approx(0.15, abs=0.02)
 
 
-@pytest.fixture(scope="module")
-def joint(empty):
-    return calibrate(empty.drive, settings=CalibrationSettings(method="joint"))
-
-
-def test_joint_calibration_weighs_its_own_drive(empty, joint):
-    w = weigh(empty.drive, joint, method="joint")
-    assert w.mass == pytest.approx(empty.drive.info.mass, rel=0.005)
-    assert 0.0 <= joint.timing.torque_lag <= 0.3
-    assert joint.provenance.method == "joint"
-
-
-def test_joint_finds_a_load_in_unknown_wind(loaded, joint):
-    w = weigh(loaded.drive, joint, method="joint")
-    truth = float(np.mean(loaded.truth.mass))
-    low, high = w.interval(0.95)
-    assert low < truth < high
-    assert w.mass == pytest.approx(truth, rel=0.03)
-
-
 def test_a_calibration_with_which_nothing_could_be_weighed_is_refused(empty, monkeypatch):
     monkeypatch.setattr(self_weighing, "TRANSFER_STD", (0.3, 0.003))
     with refused("calibration.useless"):
@@ -365,7 +378,8 @@ def test_a_calibration_with_which_nothing_could_be_weighed_is_refused(empty, mon
 def test_a_mass_given_against_the_one_a_drive_states_is_noted(empty, car):
     stated = empty.drive.info.mass
     assert not says(car.provenance.notes or "", "calibration.other_mass")
-    heavier = calibrate(empty.drive, mass=1.1 * stated)
+    quick = CalibrationSettings(method="rls")
+    heavier = calibrate(empty.drive, mass=1.1 * stated, settings=quick)
     assert says(heavier.provenance.notes, "calibration.other_mass", stated=stated)
 
 
@@ -453,8 +467,8 @@ FILE_KEYS = {
 
 
 @pytest.mark.parametrize("method", ["joint", "rls"])
-def test_report_terminal_and_file_tell_the_same(empty, tmp_path, method):
-    done = run_calibration(empty.drive, settings=CalibrationSettings(method=method))
+def test_report_terminal_and_file_tell_the_same(fitted, tmp_path, method):
+    done = fitted(method)
     done.vehicle.save(tmp_path / "car.toml")
     saved = tomllib.loads((tmp_path / "car.toml").read_text(encoding="utf-8"))
     report = dict(calibration_facts(done))
@@ -482,8 +496,8 @@ def test_report_terminal_and_file_tell_the_same(empty, tmp_path, method):
 
 
 @pytest.mark.parametrize("method", ["joint", "rls"])
-def test_the_rows_shown_are_those_of_the_vehicle_saved(empty, tmp_path, method):
-    done = run_calibration(empty.drive, settings=CalibrationSettings(method=method))
+def test_the_rows_shown_are_those_of_the_vehicle_saved(empty, fitted, tmp_path, method):
+    done = fitted(method)
     done.vehicle.save(tmp_path / "car.toml")
     balance = force_balance(
         empty.drive, Vehicle.load(tmp_path / "car.toml"), done.balances[0].motion

@@ -1,7 +1,7 @@
 """Faults of torque, load and engine speed: mended where the rest can tell, else no mass."""
 
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from itertools import product
 
 import numpy as np
@@ -72,6 +72,11 @@ class Fleet:
     def weigh(self, kind, drive, method="joint"):
         return wb.weigh(drive, self.files[kind], method)
 
+    @cache
+    def weighed(self, kind):
+        """Weigh the drive as it is."""
+        return self.weigh(kind, self.drive(kind))
+
     def weigh_alone(self, kind, drive, method="joint"):
         """Weigh by a file without witnesses of the torque's reading."""
         return wb.weigh(drive, replace(self.files[kind], witnesses=()), method)
@@ -107,7 +112,7 @@ def test_an_undamaged_drive_is_left_as_it_is(fleet, kind):
     kept = mended(drive, fleet.files[kind])
     assert kept.problems == ()
     assert all(kept.signals[n].values is s.values for n, s in drive.signals.items())
-    right(fleet, kind, fleet.weigh(kind, drive))
+    right(fleet, kind, fleet.weighed(kind))
 
 
 @pytest.mark.parametrize("kind", SOURCE)
@@ -422,7 +427,7 @@ def test_what_a_person_vouches_for_stays(fleet):
 
 
 def test_indicated_speed_lies_on_the_gears_too(fleet):
-    result = fleet.weigh("electric", fleet.drive("electric")).result
+    result = fleet.weighed("electric").result
     vehicle = fleet.files["electric"]
     line = replace(vehicle.driveline, speed_scale=1.07)
     table = result.balance.table
@@ -457,7 +462,7 @@ def test_a_speed_ten_percent_off_is_not_in_miles():
 
 
 def test_lighter_than_all_of_the_calibration_is_told_without_a_tare(fleet):
-    result = fleet.weigh("truck", fleet.drive("truck")).result
+    result = fleet.weighed("truck").result
     sure = replace(result, std=0.01 * result.mass)
 
     def told(lightest, **known):
@@ -473,7 +478,7 @@ def test_lighter_than_all_of_the_calibration_is_told_without_a_tare(fleet):
 
 
 def test_a_payload_below_nothing_is_told_or_refused(fleet):
-    result = fleet.weigh("truck", fleet.drive("truck")).result
+    result = fleet.weighed("truck").result
     vehicle = fleet.files["truck"]
     (told,) = below_tare(replace(vehicle, tare=result.mass + 273.0), replace(result, std=32.0))
     assert told.id == "mass.payload_negative"
@@ -506,9 +511,9 @@ def test_the_change_is_found_where_it_is(fleet):
     assert found.sure
     assert found.change == pytest.approx(-0.2, abs=0.05)
     assert found.start - drive.start == pytest.approx(500.0, abs=60.0)
-    clean = changing.largest(fleet.weigh("truck", fleet.drive("truck")).result.filter_input)
+    clean = changing.largest(fleet.weighed("truck").result.filter_input)
     assert not clean.sure
-    balance = fleet.weigh("truck", fleet.drive("truck")).result.balance
+    balance = fleet.weighed("truck").result.balance
     assert joint.estimate(balance, fleet.files["truck"]).filter_input.stood.max() > 0.0
 
 
@@ -534,7 +539,7 @@ def test_coarse_steps_widen_the_interval(fleet, kind):
         step = 0.08 * np.ptp(x)
         return np.floor(x / step) * step
 
-    own = fleet.weigh(kind, fleet.drive(kind))
+    own = fleet.weighed(kind)
     found = fleet.weigh(kind, with_signal(fleet.drive(kind), SOURCE[kind], change))
     assert own.result.balance.coarse_std == 0.0
     assert any(w.id == "torque.coarse" for w in found.problems)
@@ -597,8 +602,8 @@ def test_torque_whose_lag_wanders_is_refused(fleet):
 
 
 def test_method_that_joint_contradicts_gives_no_mass(fleet):
-    rows = wb.weigh(fleet.drive("electric"), fleet.files["electric"], "rls").result
-    joined = wb.weigh(fleet.drive("electric"), fleet.files["electric"]).result
+    rows = fleet.weigh("electric", fleet.drive("electric"), "rls").result
+    joined = fleet.weighed("electric").result
 
     assert contradicted(rows, joined) is None
     heavier = replace(rows, mass=1.3 * joined.mass)
