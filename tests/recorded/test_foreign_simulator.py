@@ -66,7 +66,7 @@ def test_differences_of_load_are_what_they_are(foreign_simulator, calibrated, ve
 @pytest.mark.parametrize("vehicle", VEHICLES)
 def test_next_to_no_row_that_weighs_is_braked(foreign_simulator, calibrated, vehicle):
     balance, _ = torque_balance(
-        wb.read_drive(foreign_simulator / vehicle / "drive-3"), calibrated(vehicle, THREE)
+        wb.read_drive(foreign_simulator / vehicle / "drive-3"), calibrated(vehicle, THREE[:1])
     )
     known = truth(foreign_simulator, vehicle, "drive-3")
     table = balance.table

@@ -300,9 +300,9 @@ def braked_rows(scenario):
 
 @pytest.mark.skipif(bool(config.DISABLE_JIT), reason="hours of driving need the compiler")
 def test_random_drivers_brake_as_often_as_recorded_ones():
-    def shares(*without):
+    def shares(*without, drivers=2):
         rows = []
-        for number in range(4):
+        for number in range(drivers):
             rng = np.random.default_rng([77, number])
             car = random_vehicle(rng, ("petrol_manual", "petrol_dct")[number % 2])
             scenario = Scenario(
@@ -326,7 +326,7 @@ def test_random_drivers_brake_as_often_as_recorded_ones():
             both.sum() / on.sum(),
         )
 
-    total, found, floor, both = shares()
+    total, found, floor, both = shares(drivers=4)
     assert_allclose(total, 0.17, rtol=0.3)
     ratio = np.array(found) / list(RECORDED.values())
     assert 0.55 < ratio.min() < ratio.max() < 1.8

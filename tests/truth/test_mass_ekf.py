@@ -1,5 +1,7 @@
 """The Kalman filter of speed, grade and mass against matrices, differences and a known drive."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -29,6 +31,16 @@ MASS = 11_000.0
 def drive(seed, n=6000, period=0.02, noise=1.0):
     """Two pulls on a hilly road with a coast between: forces, and the speed they make."""
     rng = np.random.default_rng(seed)
+    own = mass_ekf.Columns(*(column.copy() for column in driven(n, period)))
+    return own._replace(
+        speed=own.speed + noise * rng.normal(0.0, 0.05, n),
+        grade=own.grade + noise * rng.normal(0.0, 0.02, n),
+    )
+
+
+@cache
+def driven(n, period):
+    """The drive without noise."""
     time = np.arange(n) * period
     grade = 0.02 * np.sin(time / 15.0)
     traction = 9000.0 * (1.0 + 0.5 * np.sin(time / 7.0))
@@ -53,8 +65,8 @@ def drive(seed, n=6000, period=0.02, noise=1.0):
         drag=np.full(n, 3.3),
         headwind=np.full(n, 1.5),
         rotating=rotating,
-        speed=speed + noise * rng.normal(0.0, 0.05, n),
-        grade=grade + noise * rng.normal(0.0, 0.02, n),
+        speed=speed,
+        grade=grade,
         driven=np.ones(n, bool),
         standing=np.zeros(n, bool),
         regressor=np.full(n, np.nan),

@@ -18,7 +18,7 @@ pytestmark = pytest.mark.skipif(
 def weighed():
     """Weigh a drive whose accelerometer reads 10 % too little along the vehicle, and as it was."""
     scenario = make_scenario("electric", payload=100.0, seed=977)
-    made = simulate_car(replace(scenario, duration=1500.0, sensors=Sensors(imu_rate=50.0)))
+    made = simulate_car(replace(scenario, duration=900.0, sensors=Sensors(imu_rate=50.0)))
     car = wb.calibrate([made.drive], mass=float(made.truth.mass[0]))
     ahead = made.drive.signals["accel_x"]
     scaled = made.drive.with_signals(Signal(ahead.name, ahead.time, 0.9 * ahead.values))

@@ -1,7 +1,7 @@
 """Faults of torque, load and engine speed: mended where the rest can tell, else no mass."""
 
 from dataclasses import replace
-from functools import cache, partial
+from functools import partial
 from itertools import product
 
 import numpy as np
@@ -48,7 +48,7 @@ class Fleet:
     """Simulated vehicles with their files and one drive each."""
 
     def __init__(self):
-        self.made, self.files = {}, {}
+        self.made, self.files, self.undamaged = {}, {}, {}
         for kind, name in MADE_BY.items():
             known = self.simulated(name, 900, 1500.0)
             car = known.scenario.car
@@ -72,10 +72,11 @@ class Fleet:
     def weigh(self, kind, drive, method="joint"):
         return wb.weigh(drive, self.files[kind], method)
 
-    @cache
     def weighed(self, kind):
-        """Weigh the drive as it is."""
-        return self.weigh(kind, self.drive(kind))
+        """Weigh the drive as it is, once."""
+        if kind not in self.undamaged:
+            self.undamaged[kind] = self.weigh(kind, self.drive(kind))
+        return self.undamaged[kind]
 
     def weigh_alone(self, kind, drive, method="joint"):
         """Weigh by a file without witnesses of the torque's reading."""
