@@ -85,6 +85,12 @@ def short_drive() -> SimulatedDrive:
 
 
 @pytest.fixture(scope="session")
+def brief_drive(short_drive) -> wb.Drive:
+    """Return what was recorded in the first minutes of the short drive."""
+    return short_drive.drive.between(0.0, 420.0)
+
+
+@pytest.fixture(scope="session")
 def short_car(short_drive) -> wb.Vehicle:
     """Return the car as the short drive calibrates it."""
     return wb.calibrate([short_drive.drive], mass=float(short_drive.truth.mass[0]))

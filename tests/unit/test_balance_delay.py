@@ -95,6 +95,7 @@ def test_what_fades_is_the_sum_of_what_came_before():
 def test_noise_of_the_motion_does_not_pass_for_a_smoothed_reading(smoothing):
     scenario = make_scenario("car-calibration", seed=88103)
     smoothed = replace(scenario.car, load_smoothing=smoothing)
-    known = simulate_car(replace(scenario, car=smoothed, sensors=Sensors(imu_rate=50.0)))
+    sensors = Sensors(imu_rate=50.0)
+    known = simulate_car(replace(scenario, car=smoothed, sensors=sensors, duration=1800.0))
     timing = wb.calibrate([known.drive], mass=float(known.truth.mass.mean())).timing
     assert timing.torque_lag == pytest.approx(smoothing, abs=0.08)

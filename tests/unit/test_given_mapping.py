@@ -13,9 +13,9 @@ from weighbridge.pipeline.given import mapping_beside, mapping_of
 
 
 def test_a_path_is_read_with_the_mapping_that_the_vehicle_file_names(
-    tmp_path, short_drive, short_car
+    tmp_path, brief_drive, short_car
 ):
-    frames = to_frames(short_drive.drive)
+    frames = to_frames(brief_drive)
     own = frames["obd"].rename({"vehicle_speed_kmh": "Tacho"})
     folder = tmp_path / "own"
     folder.mkdir()
@@ -73,16 +73,16 @@ def own_frames(drive):
     return frames, {"signals": signals}
 
 
-def test_a_flat_mapping_is_for_all_frames_without_a_word(short_drive):
-    frames, mapping = own_frames(short_drive.drive)
+def test_a_flat_mapping_is_for_all_frames_without_a_word(brief_drive):
+    frames, mapping = own_frames(brief_drive)
     assert len(frames) == 3
     drive = wb.read_frame(frames, mapping)
     assert set(drive.signals) == set(mapping["signals"])
     assert not [p for p in drive.problems if p.id == "file.column_missing"]
 
 
-def test_a_mapping_of_files_is_for_frames_by_their_columns(short_drive):
-    frames, flat = own_frames(short_drive.drive)
+def test_a_mapping_of_files_is_for_frames_by_their_columns(brief_drive):
+    frames, flat = own_frames(brief_drive)
     tables = {}
     for table, frame in frames.items():
         there = {n: s for n, s in flat["signals"].items() if s["column"] in frame.columns}
@@ -92,17 +92,17 @@ def test_a_mapping_of_files_is_for_frames_by_their_columns(short_drive):
     assert not [p for p in drive.problems if p.id == "file.column_missing"]
 
 
-def test_what_no_frame_has_is_told_once(short_drive):
-    frames, mapping = own_frames(short_drive.drive)
+def test_what_no_frame_has_is_told_once(brief_drive):
+    frames, mapping = own_frames(brief_drive)
     mapping["signals"]["gear"] = {"column": "TCU_GearAct"}
     told = [p for p in wb.read_frame(frames, mapping).problems if p.id == "file.column_missing"]
     assert [p.signal for p in told] == ["gear"]
 
 
 def test_frames_are_read_with_the_mapping_that_the_vehicle_file_names(
-    tmp_path, short_drive, short_car
+    tmp_path, brief_drive, short_car
 ):
-    frames, mapping = own_frames(short_drive.drive)
+    frames, mapping = own_frames(brief_drive)
     lines = [
         f'[signals.{name}]\ncolumn = "{s["column"]}"\nunit = "{s["unit"]}"'
         for name, s in mapping["signals"].items()
@@ -111,19 +111,19 @@ def test_frames_are_read_with_the_mapping_that_the_vehicle_file_names(
     short_car.save(tmp_path / "car.toml")
     replace(short_car, mapping="map.toml").save(tmp_path / "named.toml")
     weighed = wb.weigh(frames, tmp_path / "named.toml")
-    for given in (mapping, tmp_path / "map.toml", str(tmp_path / "map.toml")):
+    for given in (mapping, str(tmp_path / "map.toml")):
         assert wb.weigh(frames, tmp_path / "car.toml", mapping=given).mass == weighed.mass
     # Canonical names need none.
-    assert wb.weigh(to_frames(short_drive.drive), tmp_path / "named.toml").mass == pytest.approx(
+    assert wb.weigh(to_frames(brief_drive), tmp_path / "named.toml").mass == pytest.approx(
         weighed.mass, rel=0.02
     )
 
 
-def test_a_mapping_for_a_drive_that_is_read_is_refused(short_drive, short_car):
+def test_a_mapping_for_a_drive_that_is_read_is_refused(brief_drive, short_car):
     with pytest.raises(wb.ConfigError, match="read already; give mapping to read_drive"):
-        wb.weigh(short_drive.drive, short_car, mapping="map.toml")
+        wb.weigh(brief_drive, short_car, mapping="map.toml")
     with pytest.raises(wb.ConfigError, match="read already"):
-        wb.calibrate(short_drive.drive, mass=1500.0, mapping="map.toml")
+        wb.calibrate(brief_drive, mass=1500.0, mapping="map.toml")
 
 
 @pytest.mark.parametrize("line", [0, None])

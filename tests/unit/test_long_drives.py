@@ -41,9 +41,9 @@ def test_memory_grows_with_the_samples_and_slowly():
     # What is compiled and imported on the way is no part of it.
     bytes_per_sample(200.0)
     # Columns of doubles: the inertial signals themselves are seven, beside these.
-    long = bytes_per_sample(4000.0)
+    long = bytes_per_sample(2000.0)
     assert long < 8 * 10
-    assert long < 1.05 * bytes_per_sample(2000.0)
+    assert long < 1.05 * bytes_per_sample(1000.0)
 
 
 def test_a_table_read_in_stretches_is_the_table(tmp_path, monkeypatch):

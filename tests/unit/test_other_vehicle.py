@@ -13,18 +13,13 @@ from weighbridge.vehicle.known import Known, describe
 
 
 @pytest.fixture(scope="module")
-def part(short_drive):
-    return short_drive.drive.between(0.0, 500.0)
-
-
-@pytest.fixture(scope="module")
-def weighed(part, short_car):
+def weighed(brief_drive, short_car):
     """Weigh the drive by its file, changed, without the masses that the calibration knew."""
 
     @cache
     def weigh(**changes):
         blank = replace(short_car.provenance, masses=())
-        return wb.weigh(part, replace(short_car, provenance=blank, **changes))
+        return wb.weigh(brief_drive, replace(short_car, provenance=blank, **changes))
 
     return weigh
 
@@ -46,11 +41,11 @@ def test_beyond_what_a_trailer_explains_there_is_no_mass(weighed):
     assert f"{found.refusal.values['times']:.1f}" == "3.0"
 
 
-def test_a_mass_of_no_such_class_is_told(weighed, part, short_car):
+def test_a_mass_of_no_such_class_is_told(weighed, brief_drive, short_car):
     assert not any(text.id == "mass.beyond_class" for text in weighed().problems)
     told = next(p for p in weighed(kind="truck").problems if p.id == "mass.beyond_class")
     assert (told.values["kind"], told.values["low"], told.values["high"]) == ("truck", 3750, 120000)
-    known = wb.weigh(part, replace(short_car, kind="truck")).problems
+    known = wb.weigh(brief_drive, replace(short_car, kind="truck")).problems
     assert not any(p.id == "mass.beyond_class" for p in known)
 
 

@@ -175,8 +175,8 @@ def test_a_flood_is_written_before_its_time(tmp_path):
     assert len(read_drive(tmp_path / "drive").signals["accel_x"]) == t.size
 
 
-def test_a_recording_replaces_nothing(tmp_path, short_drive):
-    write_drive(short_drive.drive, tmp_path / "drive")
+def test_a_recording_replaces_nothing(tmp_path, brief_drive):
+    write_drive(brief_drive, tmp_path / "drive")
     before = {f.name: f.read_bytes() for f in (tmp_path / "drive").iterdir()}
     with pytest.raises(DriveError, match="not empty, and a recording replaces nothing"):
         Recorder(tmp_path / "drive")
@@ -359,11 +359,11 @@ def test_tables_joined_before_the_process_was_killed_are_read_once(tmp_path):
     recorder.close()
 
 
-def test_a_drive_is_not_written_over_the_parts_of_another(tmp_path, short_drive):
+def test_a_drive_is_not_written_over_the_parts_of_another(tmp_path, brief_drive):
     recorder = record(tmp_path / "drive", 70, Clock())
     recorder._writer.submit(int).result()
     with pytest.raises(DriveError, match="is a folder; remove it first"):
-        write_drive(short_drive.drive, tmp_path / "drive")
+        write_drive(brief_drive, tmp_path / "drive")
     recorder._problem = "left"
     recorder.close()
 

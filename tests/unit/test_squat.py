@@ -24,7 +24,14 @@ from weighbridge.navigation.inertial import inertial_motion
 from weighbridge.navigation.longitudinal import longitudinal_motion
 from weighbridge.navigation.motion import with_squat
 from weighbridge.signals import Drive, Signal
-from weighbridge.simulation import MIDSIZE, Scenario, Sensors, mixed_route, short_route, simulate_car
+from weighbridge.simulation import (
+    MIDSIZE,
+    Scenario,
+    Sensors,
+    mixed_route,
+    short_route,
+    simulate_car,
+)
 from weighbridge.vehicle.classes import VEHICLE_CLASSES
 
 K = 0.004
@@ -34,9 +41,7 @@ K = 0.004
 @pytest.fixture(scope="module")
 def weighed():
     sensors, route = Sensors(imu_rate=50.0), short_route()
-    made = simulate_car(
-        Scenario(name="squat", car=MIDSIZE, route=route, seed=72, sensors=sensors)
-    )
+    made = simulate_car(Scenario(name="squat", car=MIDSIZE, route=route, seed=72, sensors=sensors))
     car = wb.calibrate([made.drive], mass=made.scenario.mass)
     return car, wb.weigh(made.drive, car)
 

@@ -16,8 +16,8 @@ MASS = 1600.0
 
 
 @pytest.fixture(scope="module")
-def weighed(short_drive, short_car):
-    return weigh(short_drive.drive, short_car).result
+def weighed(brief_drive, short_car):
+    return weigh(brief_drive, short_car).result
 
 
 def moved(torque, accel):
