@@ -5,6 +5,7 @@ with noise, a tilted sensor and quantised speed.
 """
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -29,6 +30,7 @@ CAR = Vehicle(
 )
 
 
+@cache
 def make_drive(seed=1, mounting=(0.02, -0.1, 0.6), duration=900.0, bends=1.0):
     """Drive 15 min at 3 to 27 m/s through bends, at 48 degrees north."""
     rng = np.random.default_rng(seed)

@@ -10,7 +10,7 @@ import weighbridge as wb
 from weighbridge.estimators import joint
 from weighbridge.estimators.regression import regression
 from weighbridge.signals import Drive, Signal
-from weighbridge.simulation import MIDSIZE, Polling, Scenario, short_route, simulate_car
+from weighbridge.simulation import MIDSIZE, Polling, Scenario, Sensors, short_route, simulate_car
 from weighbridge.vehicle.fuel import DENSITY, SEEN, Burnt, fuel_burnt, fuel_flow
 from weighbridge.vehicle.model import Driveline, Vehicle
 
@@ -91,6 +91,7 @@ def weighed():
             car=MIDSIZE,
             route=short_route(),
             seed=71,
+            sensors=Sensors(imu_rate=50.0),
             polling=Polling(fast=(*Polling().fast, "fuel_rate")),
         )
     )

@@ -39,7 +39,7 @@ def sheet(car=ELECTRIC):
 @pytest.fixture(scope="module")
 def made():
     scenario = replace(
-        make_scenario("electric", seed=33), duration=1500.0, sensors=Sensors(imu_rate=50.0)
+        make_scenario("electric", seed=33), duration=1000.0, sensors=Sensors(imu_rate=50.0)
     )
     return simulate_car(scenario)
 
