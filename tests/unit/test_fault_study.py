@@ -31,7 +31,7 @@ needs_compiler = pytest.mark.skipif(
 
 @pytest.fixture(scope="module")
 def car():
-    (subject,) = build("car", 8300, duration=600.0)
+    (subject,) = build("car", 8300, duration=450.0)
     return subject
 
 

@@ -530,10 +530,9 @@ def test_powershift_keeps_pulling_and_an_automated_box_does_not():
     assert least["truck"] < 0.05
 
 
-@pytest.mark.parametrize("payload", [0.0, 9000.0])
-def test_truck_drives_like_a_truck(payload):
-    truth = simulate_car(quiet("truck", 2700.0, payload=payload)).truth
-    assert_allclose(truth.mass[0], 9000.0 + payload)
+def test_truck_drives_like_a_truck():
+    truth = simulate_car(quiet("truck", 2700.0, payload=9000.0)).truth
+    assert_allclose(truth.mass[0], 18_000.0)
     assert 85.0 < truth.speed.max() * 3.6 < 97.0
     assert truth.accel.max() < 1.8
     assert truth.engine_speed.max() < TRUCK18.max_speed * 1.03
