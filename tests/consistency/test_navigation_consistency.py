@@ -1,11 +1,13 @@
 """Grade and squat of the navigation: errors are as large as it says, on simulated drives."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.stats import chi2
 
 from weighbridge.navigation.inertial import inertial_motion
-from weighbridge.simulation import make_scenario, simulate_car
+from weighbridge.simulation import Sensors, make_scenario, simulate_car
 
 SEEDS = range(401, 407)
 APART = 60.0
@@ -18,7 +20,7 @@ def errors():
     grade, squat = [], []
     for seed in SEEDS:
         scenario = make_scenario("car-short", payload=100.0, seed=seed)
-        made = simulate_car(scenario)
+        made = simulate_car(replace(scenario, sensors=Sensors(imu_rate=50.0)))
         motion, truth = inertial_motion(made.drive), made.truth
         at = np.searchsorted(motion.time, np.arange(APART, made.drive.duration - APART, APART))
         true = np.interp(motion.time[at], truth.time, truth.grade)

@@ -126,12 +126,12 @@ def test_longer_stops_change_the_load_more_often():
 @pytest.mark.skipif(bool(config.DISABLE_JIT), reason="whole drives take minutes without a compiler")
 @pytest.mark.parametrize("load", [-250.0, 350.0])
 def test_a_parcel_handed_over_in_twelve_seconds_is_weighed(load):
-    logger = {"duration": 1500.0, "sensors": Sensors(imu_rate=50.0)}
+    logger = {"duration": 1000.0, "sensors": Sensors(imu_rate=50.0)}
     known = simulate_car(replace(make_scenario("car", payload=250.0, seed=910), **logger))
     mass = float(known.truth.mass[0])
     file = wb.calibrate([known.drive], mass=mass, vehicle=known_vehicle(known))
     made = replace(make_scenario("car", payload=250.0, seed=911), **logger)
-    middle = float(np.interp(700.0, *along(simulate_car(made))))
+    middle = float(np.interp(500.0, *along(simulate_car(made))))
     stop = Loading(distance=middle, duration=12.0, load=load)
     drive = simulate_car(replace(made, loading=(stop,)))
     found = wb.weigh(drive.drive, file)

@@ -47,6 +47,12 @@ def empty():
 
 
 @pytest.fixture(scope="module")
+def part(empty):
+    """The first minutes of the empty car, for what is refused."""
+    return empty.drive.between(empty.drive.start, empty.drive.start + 450.0)
+
+
+@pytest.fixture(scope="module")
 def loaded():
     return short(32, 300.0)
 
@@ -313,10 +319,10 @@ def test_too_little_to_calibrate_by(empty):
         calibrate(empty.drive.between(0.0, 90.0))
 
 
-def test_a_source_that_says_nothing_is_refused(empty):
-    load = empty.drive.signals["engine_load"]
+def test_a_source_that_says_nothing_is_refused(part):
+    load = part.signals["engine_load"]
     noise = np.random.default_rng(4).uniform(0.3, 0.55, load.values.size)
-    useless = empty.drive.with_signals(Signal("engine_load", load.time, noise))
+    useless = part.with_signals(Signal("engine_load", load.time, noise))
     with refused("calibration.no_slope", reading="engine_load"):
         calibrate(useless, settings=CalibrationSettings(source="load"))
 
@@ -325,11 +331,11 @@ def test_a_source_that_says_nothing_is_refused(empty):
     ("engine", "why"),
     [("diesel", "calibration.diesel_air"), (None, "calibration.no_slope")],
 )
-def test_the_air_flow_of_a_diesel_is_refused_by_its_cause(empty, engine, why):
+def test_the_air_flow_of_a_diesel_is_refused_by_its_cause(part, engine, why):
     # Without a throttle each turn of the engine takes in the same air.
-    speed = empty.drive.signals["engine_speed"]
+    speed = part.signals["engine_speed"]
     air = Signal("mass_air_flow", speed.time, 3e-4 * speed.values)
-    drive = empty.drive.with_signals(air)
+    drive = part.with_signals(air)
     with refused(why):
         calibrate(
             drive, vehicle=Vehicle(engine=engine), settings=CalibrationSettings(source="air_flow")
@@ -369,10 +375,10 @@ def test_an_inertia_stated_counts_though_engines_of_cars_have_it(electric, metho
     assert found.driveline.engine_inertia == pytest.approx(0.15, abs=0.02)
 
 
-def test_a_calibration_with_which_nothing_could_be_weighed_is_refused(empty, monkeypatch):
+def test_a_calibration_with_which_nothing_could_be_weighed_is_refused(part, monkeypatch):
     monkeypatch.setattr(self_weighing, "TRANSFER_STD", (0.3, 0.003))
     with refused("calibration.useless"):
-        calibrate(empty.drive)
+        calibrate(part)
 
 
 def test_a_mass_given_against_the_one_a_drive_states_is_noted(empty, car):
