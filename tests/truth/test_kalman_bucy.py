@@ -204,7 +204,7 @@ def rough_ride(hz, seconds, seed):
     return RideSamples(time=time, travel=travel, rate=rate, velocity=velocity)
 
 
-@pytest.mark.parametrize("hz", [100, 200, 333, 500, 1000])
+@pytest.mark.parametrize("hz", [100, 333, 1000])
 def test_covariance_stays_positive_definite(hz):
     ride = rough_ride(hz, 20.0, seed=hz)
     live = InertiaFilter(RIDE, 1.0 / hz)

@@ -82,7 +82,7 @@ def test_what_comes_later_changes_no_bit(weighing, setup, whole, part):
 
 def test_a_drive_that_pauses_goes_on(weighing, setup):
     """Bus and sensor are silent for a while; what comes after is weighed as before."""
-    drive = weighing.drive.between(0.0, weighing.drive.start + 0.75 * weighing.drive.duration)
+    drive = weighing.drive.between(0.0, weighing.drive.start + 0.6 * weighing.drive.duration)
     middle = drive.start + 0.3 * drive.duration
     gap = paused(drive)
     track = forward_weigh(gap, setup)
