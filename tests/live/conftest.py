@@ -1,5 +1,7 @@
 """A simulated car, calibrated and weighed once, for all tests of live weighing."""
 
+import copy
+
 import pytest
 
 import weighbridge as wb
@@ -24,7 +26,7 @@ def simulated(name, payload, seed):
 
 @pytest.fixture(scope="session")
 def car():
-    known = [simulated("known", load, 51_001 + k) for k, load in enumerate((0.0, 300.0, 100.0))]
+    known = [simulated("known", load, 51_001 + k) for k, load in enumerate((0.0, 300.0))]
     return wb.calibrate([m.drive for m in known], mass=[m.scenario.mass for m in known])
 
 
@@ -46,6 +48,26 @@ def setup(weighing):
 @pytest.fixture(scope="session")
 def short(weighing):
     return weighing.drive.between(weighing.drive.start, weighing.drive.start + SHORT)
+
+
+@pytest.fixture(scope="session")
+def middle(short):
+    """Return an instant in the short drive at which there is a mass."""
+    return short.start + 165.0
+
+
+@pytest.fixture(scope="session")
+def _half_driven(short, middle, weighing, setup):
+    scale = wb.LiveScale(weighing.vehicle, setup=setup, info=short.info)
+    part = short.between(short.start, middle)
+    scale.update_block({n: (s.time, s.values) for n, s in part.signals.items()})
+    return scale
+
+
+@pytest.fixture
+def half_driven(_half_driven):
+    """Return a scale that has heard the short drive up to its middle."""
+    return copy.deepcopy(_half_driven)
 
 
 @pytest.fixture(scope="session")

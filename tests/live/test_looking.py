@@ -16,6 +16,7 @@ from weighbridge.live.outputs import Outputs
 from weighbridge.live.replay import Replay
 from weighbridge.live.session import Session
 from weighbridge.live.weighing import LiveStatus
+from weighbridge.signals.recent import LONGEST_STEP
 
 
 @pytest.fixture
@@ -39,7 +40,7 @@ def minutes(loaded):
 
 
 def aside(car, drive):
-    scale = wb.LiveScale(car, info=drive.info)
+    scale = wb.LiveScale(car, info=drive.info, step=LONGEST_STEP)
     scale.looks_aside = True
     return scale
 
@@ -70,12 +71,14 @@ def look_of(scale, parts, driven, held):
 
 
 def test_what_is_found_beside_is_what_is_found_in_between(car, minutes, held):
-    """Each look is held for four steps of the stages."""
-    waited, scale, taken = wb.LiveScale(car, info=minutes.info), aside(car, minutes), []
+    """Each look is held for two steps of the stages."""
+    minutes = minutes.between(minutes.start, minutes.start + 250.0)
+    waited, scale, taken = aside(car, minutes), aside(car, minutes), []
+    waited.looks_aside = False
     for block in halves(minutes):
         waited.update_block(block)
         scale.update_block(block)
-        if scale._looking is not None and len(scale._looking.steps) >= 4:
+        if scale._looking is not None and len(scale._looking.steps) >= 2:
             held.set()
             scale._take(wait=True)
             held.clear()
@@ -126,7 +129,7 @@ def test_the_next_look_waits_for_the_one_before(car, minutes, held):
 
 def test_a_change_of_load_forgets_what_a_look_finds(car, minutes, held):
     scale = aside(car, minutes)
-    look = look_of(scale, halves(minutes), 150.0, held)
+    look = look_of(scale, halves(minutes), 100.0, held)
     held.set()
     scale.load_changed()
     assert look.found().mass > 0.0
@@ -136,7 +139,7 @@ def test_a_change_of_load_forgets_what_a_look_finds(car, minutes, held):
 
 def test_a_new_drive_leaves_behind_what_a_look_finds(car, minutes, held):
     scale = aside(car, minutes)
-    look = look_of(scale, halves(minutes), 150.0, held)
+    look = look_of(scale, halves(minutes), 100.0, held)
     scale._records.resumed = scale.newest
     held.set()
     scale.renew()
@@ -149,7 +152,7 @@ def test_a_new_drive_leaves_behind_what_a_look_finds(car, minutes, held):
 def test_a_checkpoint_is_written_while_a_look_goes_on(car, minutes, held):
     """It holds what the stages know, and what is found later hangs on neither."""
     scale, parts = aside(car, minutes), halves(minutes)
-    look = look_of(scale, parts, 220.0, held)
+    look = look_of(scale, parts, 120.0, held)
     for _ in range(4):
         scale.update_block(next(parts))
     kept = scale.checkpoint()

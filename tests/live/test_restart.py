@@ -69,11 +69,10 @@ def test_a_sensor_that_begins_anew_alone_is_of_the_same_drive(car, loaded):
 
 @pytest.mark.parametrize("restarted", [False, True])
 def test_after_a_silence_it_is_said_that_the_mass_is_that_of_before(
-    short, weighing, setup, restarted
+    short, weighing, middle, half_driven, restarted
 ):
     """Until the vehicle was driven for two minutes, or somebody says that the load has changed."""
-    middle = short.start + 150.0
-    scale = wb.LiveScale(weighing.vehicle, setup=setup, info=weighing.drive.info)
+    scale = half_driven
 
     def feed(start, end, later=0.0):
         for at in np.arange(start, end, 1.0):
@@ -81,7 +80,7 @@ def test_after_a_silence_it_is_said_that_the_mass_is_that_of_before(
             scale.update_block({n: (s.time + later, s.values) for n, s in part.signals.items()})
             yield scale.weighing()
 
-    before = list(feed(short.start, middle))[-1]
+    before = scale.weighing()
     assert before.mass > 0.0
     assert not before.notes
     if restarted:
@@ -104,15 +103,11 @@ def test_after_a_silence_it_is_said_that_the_mass_is_that_of_before(
 
 
 def test_after_a_clock_was_set_back_the_mass_is_that_of_before_until_it_is_proved(
-    short, weighing, setup
+    short, weighing, middle, half_driven
 ):
-    middle = short.start + 150.0
-    scale = wb.LiveScale(weighing.vehicle, setup=setup, info=weighing.drive.info)
-    part = short.between(short.start, middle)
-    scale.update_block({n: (s.time, s.values) for n, s in part.signals.items()})
-    before = scale.weighing()
+    before = half_driven.weighing()
     assert before.mass > 0.0
-    scale = wb.LiveScale.restore(weighing.vehicle, scale.checkpoint())
+    scale = wb.LiveScale.restore(weighing.vehicle, half_driven.checkpoint())
     back = 7200.0
     scale.clock_set_back(middle - back)
     told = []

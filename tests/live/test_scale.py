@@ -1,15 +1,15 @@
 """A live scale beside the forward pass of the recorded drive, whatever the way samples come."""
 
+import copy
 from dataclasses import replace
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 import pytest
-from hypothesis import Phase, given, settings
-from hypothesis import strategies as st
 
 import weighbridge as wb
-from tests.live.conftest import PHONE, SHORT
+from tests.live.conftest import PHONE
 from weighbridge.balance.averaging import WINDOW
 from weighbridge.errors import ConfigError
 from weighbridge.estimators.judging import STOP
@@ -49,36 +49,26 @@ def even(drive, length):
     return np.append(np.arange(drive.start, drive.end, length), drive.end + 1.0)
 
 
-def test_steps_of_four_seconds_end_where_those_of_one_do(short, weighing, setup):
+def test_steps_of_four_seconds_end_where_those_of_one_do(brief, weighing, setup):
     """A drive does not end with a whole step: what is left is weighed as well."""
     ends = []
     for length in (STEP, LONGEST_STEP):
         scale = wb.LiveScale(
             weighing.vehicle, setup=replace(setup, step=length), info=weighing.drive.info
         )
-        scale.update_block({n: (s.time, s.values) for n, s in short.signals.items()})
-        scale.finish()
-        ends.append(scale.weighing())
+        ends.append(fed(scale, brief, [brief.start, brief.end + 1.0]))
     assert ends[1].time == ends[0].time
     assert ends[1].mass == pytest.approx(ends[0].mass, rel=1e-3)
     assert ends[1].std == pytest.approx(ends[0].std, rel=1e-2)
 
 
-@settings(max_examples=2, deadline=None, phases=[Phase.explicit, Phase.generate])
-@given(
-    lengths=st.lists(st.floats(0.4, 40.0), min_size=1, max_size=12),
-    late=st.sampled_from([0.0, 0.3, 0.9]),
-    seed=st.integers(0, 2**32 - 1),
-)
-@pytest.mark.filterwarnings("ignore:Generating overly large repr")
-def test_live_is_the_forward_pass_to_the_last_bit(
-    brief, weighing, setup, forward_brief, lengths, late, seed
-):
+def test_live_is_the_forward_pass_to_the_last_bit(brief, weighing, setup, forward_brief):
+    late, lengths = 0.9, (0.4, 7.0, 0.9, 2.3, 0.7, 21.0, 1.1)
     edges = [brief.start]
     while edges[-1] < brief.end:
         edges.append(edges[-1] + lengths[len(edges) % len(lengths)])
     edges.append(edges[-1] + 1.0)
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(11)
     scale = wb.LiveScale(weighing.vehicle, setup=setup, info=weighing.drive.info)
     held = {}
     for block in blocks(brief, edges):
@@ -92,7 +82,6 @@ def test_live_is_the_forward_pass_to_the_last_bit(
             held[name] = time[order][hold[order]], values[order][hold[order]]
         scale.update_block(before)
         scale.update_block(now)
-        scale.weighing(ahead=True)
     scale.update_block(held)
     scale.finish()
     told = scale.weighing()
@@ -102,20 +91,23 @@ def test_live_is_the_forward_pass_to_the_last_bit(
     assert told.std == forward_brief.std[-1]
 
 
-def test_single_samples_are_blocks_of_one(brief, weighing, setup, forward_brief):
-    scale = wb.LiveScale(weighing.vehicle, setup=setup, info=weighing.drive.info)
+def test_single_samples_are_blocks_of_one(short, middle, half_driven):
+    part = short.between(np.nextafter(middle, np.inf), middle + 10.0)
+    single, whole = half_driven, copy.deepcopy(half_driven)
     samples = sorted(
         (t, n, v)
-        for n, s in brief.signals.items()
+        for n, s in part.signals.items()
         for t, v in zip(s.time.tolist(), s.values.tolist(), strict=True)
     )
+    before = single.weighing().mass
     for time, name, value in samples:
-        scale.update(time, name, value)
-    scale.finish()
-    assert scale.weighing().std == forward_brief.std[-1]
+        single.update(time, name, value)
+    single.finish()
+    assert single.weighing().mass == fed(whole, part, [part.start, part.end + 1.0]).mass != before
+    assert single.checkpoint() == whole.checkpoint()
 
 
-@pytest.mark.parametrize("step", [0.25, 1.0])
+@pytest.mark.parametrize("step", [0.25, LONGEST_STEP])
 def test_other_steps_are_those_of_the_setup(brief, weighing, step):
     setup = identify_forward(weighing, step)
     forward = forward_weigh(brief, setup)
@@ -126,30 +118,34 @@ def test_other_steps_are_those_of_the_setup(brief, weighing, step):
 
 
 def test_a_step_that_rounds_is_refused(car):
-    with pytest.raises(ConfigError, match=r"step of 0\.3 s .* 0\.25, 0\.5, 1"):
+    with pytest.raises(ConfigError, match=r"0\.25, 0\.5, 1"):
         wb.LiveScale(car, step=0.3)
 
 
-def test_the_settled_mass_is_as_old_as_lateness_look_ahead_and_step(brief, weighing, setup):
+def test_the_settled_mass_is_as_old_as_lateness_look_ahead_and_step(looked_at, setup):
     """Samples come in blocks of 0.1 s, as from a source."""
-    scale = wb.LiveScale(weighing.vehicle, setup=setup, info=weighing.drive.info)
-    ages = []
-    for block in blocks(brief, even(brief, 0.1)):
-        scale.update_block(block)
-        ages.append(scale.weighing().age)
-    ages = np.array([a for a in ages if np.isfinite(a)])[300:]
+    ages = np.array([a for a in looked_at.ages if np.isfinite(a)])[300:]
     # A torque reading, and so a row, comes a tenth of a second after the one before.
     row = 1.5 * setup.period
     assert np.percentile(ages, 99.0) < LATENESS + lateness(setup) + STEP + row
     assert np.percentile(ages, 1.0) > LATENESS
 
 
-def looked_at_each_second(scale, drive, late=0.0):
-    """Provisional weighings each second, and settled ones at each step, of a drive as it comes.
+class LookedAt(NamedTuple):
+    """A drive as it comes in blocks of 0.1 s: what is shown of it each second, and what settles.
 
-    Of ``late`` [s], a third of the samples come so much later than the others.
+    ``ages`` are those of the settled mass at each block [s].
     """
+
+    shown: list
+    settled: np.ndarray
+    ages: list
+
+
+def looked_at_each_second(scale, drive, late=0.0):
+    """Of ``late`` [s], a third of the samples come so much later than the others."""
     rng, held, shown, settled, shown_at = np.random.default_rng(7), {}, [], [], -np.inf
+    ages = []
     for block in blocks(drive, even(drive, 0.1)):
         before, held, now = held, {}, {}
         for name, (time, values) in block.items():
@@ -157,6 +153,7 @@ def looked_at_each_second(scale, drive, late=0.0):
             now[name], held[name] = (time[~hold], values[~hold]), (time[hold], values[hold])
         scale.update_block(now)
         scale.update_block(before)
+        ages.append(scale.weighing().age)
         if scale._state is None or not scale._state.joint.windows:
             continue
         if not settled or scale._state.force.time > settled[-1][0]:
@@ -166,12 +163,17 @@ def looked_at_each_second(scale, drive, late=0.0):
         if scale.newest - shown_at >= 1.0:
             shown_at = scale.newest
             shown.append(scale.weighing(ahead=True))
-    return shown, np.array(settled)
+    return LookedAt(shown, np.array(settled), ages)
 
 
-def test_the_provisional_mass_is_young_and_near_the_settled_one(brief, weighing, setup):
+@pytest.fixture(scope="module")
+def looked_at(brief, weighing, setup):
     scale = wb.LiveScale(weighing.vehicle, setup=setup, info=weighing.drive.info)
-    shown, settled = looked_at_each_second(scale, brief)
+    return looked_at_each_second(scale, brief)
+
+
+def test_the_provisional_mass_is_young_and_near_the_settled_one(looked_at):
+    shown, settled, _ = looked_at
     told = [w for w in shown if np.isfinite(w.mass) and w.time <= settled[-1, 0]]
     assert len(told) > 60
     assert all(w.provisional for w in told)
@@ -186,7 +188,7 @@ def test_the_provisional_mass_is_young_and_near_the_settled_one(brief, weighing,
 def test_the_provisional_mass_waits_for_no_late_sample(brief, weighing, setup):
     """A third of the samples come 0.1 s late: it is no older, and within a standard deviation."""
     scale = wb.LiveScale(weighing.vehicle, setup=setup, info=weighing.drive.info)
-    shown, settled = looked_at_each_second(scale, brief, late=0.1)
+    shown, settled, _ = looked_at_each_second(scale, brief, late=0.1)
     told = [w for w in shown if np.isfinite(w.mass) and w.time <= settled[-1, 0]]
     assert np.percentile([w.age for w in told], 99.0) <= LATENESS + 0.2
     known = np.interp([w.time for w in told], settled[:, 0], settled[:, 1])
@@ -194,12 +196,12 @@ def test_the_provisional_mass_waits_for_no_late_sample(brief, weighing, setup):
     assert np.abs(far).max() < 0.5
 
 
-def test_a_look_ahead_leaves_no_trace(brief, weighing, setup):
+def test_a_look_ahead_leaves_no_trace(short, middle, half_driven):
     """The states of two scales are the same to the last letter; one of them is looked at."""
-    kept = []
+    kept, part = [], short.between(middle, middle + 15.0)
     for looks in (False, True):
-        scale = wb.LiveScale(weighing.vehicle, setup=setup, info=weighing.drive.info)
-        for block in blocks(brief, even(brief, 0.5)):
+        scale = copy.deepcopy(half_driven)
+        for block in blocks(part, even(part, 0.5)):
             scale.update_block(block)
             if looks:
                 scale.weighing(ahead=True)
@@ -227,9 +229,9 @@ def test_an_open_window_that_is_full_counts_as_the_whole_one(brief, weighing, se
     assert whole > 5
 
 
-def test_a_scale_learns_and_weighs(car, loaded, weighing):
+def test_a_scale_learns_and_weighs(car, loaded):
     scale = wb.LiveScale(car, info=loaded.drive.info, step=LONGEST_STEP)
-    drive = loaded.drive
+    drive = loaded.drive.between(loaded.drive.start, loaded.drive.start + 450.0)
     statuses = []
     for block in blocks(drive, even(drive, 5.0)):
         scale.update_block(block)
@@ -239,13 +241,11 @@ def test_a_scale_learns_and_weighs(car, loaded, weighing):
     assert statuses[0] is LiveStatus.LEARNING
     assert told.status is LiveStatus.WEIGHED
     # At the end all records are weighed as those of a recorded drive are.
-    assert told.mass == pytest.approx(weighing.mass, rel=0.001)
+    assert told.mass == pytest.approx(wb.weigh(drive, car).mass, rel=0.001)
     low, high = told.interval()
     assert low < loaded.scenario.mass < high
     assert told.progress > 0.3
     assert all(s.fresh for s in told.signals if s.needed)
-    same = wb.LiveScale(car, info=loaded.drive.info, step=LONGEST_STEP)
-    assert fed(same, drive, even(drive, 37.0)).mass == told.mass
 
 
 def test_a_first_mass_is_shown_before_it_counts_as_weighed(car, loaded):
@@ -270,6 +270,10 @@ def test_a_first_mass_is_shown_before_it_counts_as_weighed(car, loaded):
     # The way to 5 %: nothing is known before the first look.
     assert np.isnan(before[0])
     assert before[-1] == pytest.approx((0.1 * first.mass / (high - low)) ** 2)
+    same = wb.LiveScale(car, info=loaded.drive.info, step=LONGEST_STEP)
+    for block in blocks(part, even(part, 37.0)):
+        same.update_block(block)
+    assert same.weighing().mass == told.mass
 
 
 def test_looks_are_frequent_until_there_is_a_mass():
@@ -282,12 +286,9 @@ def test_looks_are_frequent_until_there_is_a_mass():
     assert at == [30.0, 45.0, 60.0, 75.0, 90.0, 135.0, 203.0, 305.0, 458.0]
 
 
-def test_a_checkpoint_loses_nothing(short, weighing, setup, forward, tmp_path):
-    middle = short.start + 0.8 * SHORT
-    scale = wb.LiveScale(weighing.vehicle, setup=setup, info=weighing.drive.info)
-    for block in blocks(short, even(short.between(short.start, middle), 7.0)[:-1]):
-        scale.update_block(block)
-    rest = scale._records.newest
+def test_a_checkpoint_loses_nothing(short, weighing, forward, half_driven):
+    scale = half_driven
+    rest = scale.newest
     saved = scale.checkpoint()
     assert len(saved) < 3e6
     again = wb.LiveScale.restore(weighing.vehicle, saved)
@@ -300,21 +301,20 @@ def test_a_checkpoint_loses_nothing(short, weighing, setup, forward, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("damage", "says"),
+    "damage",
     [
-        (lambda b: b[: len(b) // 2], "damaged"),
-        (lambda b: b.replace('"d"', '"x"', 1), "damaged"),
-        (lambda b: b.replace(f'checkpoint": {VERSION}', 'checkpoint": 99', 1), "version 99"),
-        (lambda b: "\xff" + b, "damaged"),
-        (lambda b: "", "damaged"),
+        lambda b: b[: len(b) // 2],
+        lambda b: b.replace('"d"', '"x"', 1),
+        lambda b: b.replace(f'checkpoint": {VERSION}', 'checkpoint": 99', 1),
+        lambda b: "\xff" + b,
+        lambda b: "",
     ],
 )
-def test_a_damaged_checkpoint_is_refused(short, weighing, setup, damage, says):
-    scale = wb.LiveScale(weighing.vehicle, setup=setup, info=weighing.drive.info)
-    fed(scale, short.between(short.start, short.start + 60.0), even(short, 60.0)[:2])
-    saved = damage(scale.checkpoint())
-    with pytest.raises(ConfigError, match=says):
-        wb.LiveScale.restore(weighing.vehicle, saved)
+def test_a_damaged_checkpoint_is_refused(weighing, half_driven, damage):
+    saved = half_driven.checkpoint()
+    assert damage(saved) != saved
+    with pytest.raises(ConfigError):
+        wb.LiveScale.restore(weighing.vehicle, damage(saved))
 
 
 def test_a_checkpoint_of_another_vehicle_is_refused(weighing, setup):
@@ -323,31 +323,33 @@ def test_a_checkpoint_of_another_vehicle_is_refused(weighing, setup):
         wb.LiveScale.restore(replace(weighing.vehicle, tare=1000.0), saved)
 
 
-def test_a_silence_of_hours_costs_no_steps(short, weighing, setup, forward):
+def test_a_silence_of_hours_costs_no_steps(short, middle, half_driven, setup, forward):
     """After five hours without a sample the mass stays, and memory and time do not grow."""
     gap = 5 * 3600.0
-    later = short.with_signals(
-        *(
-            replace(s, time=np.where(s.time < short.start + 120.0, s.time, s.time + gap))
-            for s in short.signals.values()
+
+    def later(than):
+        return short.with_signals(
+            *(
+                replace(s, time=np.where(s.time < than, s.time, s.time + gap))
+                for s in short.signals.values()
+            )
         )
-    )
+
     # An hour is the farthest that a stamp may lie ahead; then the clock is taken to have jumped.
-    scale = wb.LiveScale(weighing.vehicle, setup=setup, info=weighing.drive.info)
-    told = fed(scale, later, [later.start, later.start + 120.0, later.end + 1.0])
+    told = fed(half_driven, later(middle), [middle + 1.0, short.end + gap + 1.0])
     # The load may have changed meanwhile, so a few windows tell less than they do without a stop.
     assert abs(told.mass - forward.mass[-1]) < forward.std[-1]
-    direct = forward_weigh(later, setup)
+    direct = forward_weigh(later(short.start + 120.0), setup)
     assert abs(direct.mass[-1] - forward.mass[-1]) < 2.0 * direct.std[-1]
     assert direct.std[-1] > forward.std[-1]
 
 
-def test_a_silence_after_the_state_was_kept_is_survived(short, weighing, setup, forward):
+def test_a_silence_after_the_state_was_kept_is_survived(short, middle, half_driven, forward):
     """An adapter is unplugged for half a minute; a slow signal had nothing open just before."""
-    gone = short.start + 120.0
-    scale = wb.LiveScale(weighing.vehicle, setup=setup, info=weighing.drive.info)
-    scale.update(short.start, "ambient_temperature", 20.0)
-    for block in blocks(short, even(short.between(short.start, gone), 0.5)):
+    gone = middle + 10.0
+    scale = half_driven
+    scale.update(scale.newest, "ambient_temperature", 20.0)
+    for block in blocks(short, even(short.between(middle, gone), 0.5)):
         scale.update_block(block)
         scale.checkpoint()
     for block in blocks(short, even(short.between(gone + 30.0, short.end), 0.5)):
@@ -356,24 +358,21 @@ def test_a_silence_after_the_state_was_kept_is_survived(short, weighing, setup, 
     assert abs(scale.weighing().mass - forward.mass[-1]) < forward.std[-1]
 
 
-def test_a_clock_that_jumps_is_brought_back(short, weighing, setup, forward):
+def test_a_clock_that_jumps_is_brought_back(short, middle, half_driven, forward):
     """From 1970 to the date in mid-drive: time goes on, and it is said once."""
-    scale = wb.LiveScale(weighing.vehicle, setup=setup, info=weighing.drive.info)
-    jump = 1.7e9
-    for k, block in enumerate(blocks(short, even(short, 0.5))):
-        moved = jump if k > 240 else 0.0
-        scale.update_block({n: (t + moved, v) for n, (t, v) in block.items()})
+    scale, jump = half_driven, 1.7e9
+    for block in blocks(short, even(short.between(middle, short.end), 0.5)):
+        scale.update_block({n: (t + jump, v) for n, (t, v) in block.items()})
     scale.finish()
     told = scale.weighing()
     assert told.mass == pytest.approx(forward.mass[-1], rel=0.01)
-    assert sum("jumped" in n for n in told.notes) == 1
+    assert [p.id for p in told.problems].count("live.clock_jumps") == 1
 
 
-def test_unfit_and_late_samples_are_counted(short, weighing, setup):
-    scale = wb.LiveScale(weighing.vehicle, setup=setup, info=weighing.drive.info)
-    fed(scale, short.between(short.start, short.start + 30.0), [short.start, short.start + 31.0])
-    scale.update(short.start + 1.0, "vehicle_speed", 3.0)
-    scale.update(short.start + 40.0, "vehicle_speed", float("nan"))
+def test_unfit_and_late_samples_are_counted(middle, half_driven):
+    scale = half_driven
+    scale.update(middle - 10.0, "vehicle_speed", 3.0)
+    scale.update(middle + 10.0, "vehicle_speed", float("nan"))
     speed = next(s for s in scale.weighing().signals if s.name == "vehicle_speed")
     assert (speed.late, speed.unfit) == (1, 1)
     with pytest.raises(ConfigError, match="no signal"):
@@ -382,7 +381,8 @@ def test_unfit_and_late_samples_are_counted(short, weighing, setup):
 
 def test_a_signal_that_stays_away_is_named(short, weighing):
     scale = wb.LiveScale(weighing.vehicle)
-    told = fed(scale, short.without("engine_load"), even(short, 5.0))
+    part = short.between(short.start, short.start + 60.0)
+    told = fed(scale, part.without("engine_load"), even(part, 5.0))
     assert told.status is LiveStatus.LEARNING
     assert np.isnan(told.mass)
     assert "engine_load" in told.reason
@@ -396,7 +396,7 @@ def test_a_parked_vehicle_keeps_its_mass_while_it_is_asked_each_30_s(weighing, s
     scale.update_block({n: (s.time, s.values) for n, s in part.signals.items()})
     before = scale.weighing()
     assert not before.parked
-    time = np.arange(stands + 0.02, stands + 200.0, 0.02)
+    time = np.arange(stands + 0.02, stands + 100.0, 0.02)
     seen = []
     for first in range(0, time.size, 250):
         now = time[first : first + 250]
@@ -424,7 +424,8 @@ def test_a_parked_vehicle_keeps_its_mass_while_it_is_asked_each_30_s(weighing, s
 
 
 def test_what_never_came_is_a_fault_of_a_vehicle_that_stands_too(weighing, setup, short):
-    stands = float(short.speed.time[short.speed.values == 0.0][-1])
+    still = short.speed.time[short.speed.values == 0.0]
+    stands = float(still[still < short.start + 100.0][-1])
     part = short.without("engine_load").between(short.start, stands)
     scale = wb.LiveScale(weighing.vehicle, setup=setup, info=short.info)
     scale.update_block({n: (s.time, s.values) for n, s in part.signals.items()})
@@ -451,7 +452,7 @@ def test_a_signal_that_comes_each_30_s_is_not_silent():
 def test_a_change_of_load_forgets_the_learned_mass_and_its_records(car, loaded):
     """Records of the load before are neither shown nor weighed again."""
     scale = wb.LiveScale(car, info=loaded.drive.info)
-    part = loaded.drive.between(loaded.drive.start, loaded.drive.start + 400.0)
+    part = loaded.drive.between(loaded.drive.start, loaded.drive.start + 150.0)
     for block in blocks(part, even(part, 20.0)):
         scale.update_block(block)
     assert scale.weighing().mass > 0.0
@@ -470,7 +471,8 @@ def test_a_change_of_load_is_found_on_the_way(car, loaded):
         )
     )  # fmt: skip
     scale = wb.LiveScale(car, info=made.drive.info, step=LONGEST_STEP)
-    told = fed(scale, made.drive, even(made.drive, 20.0))
+    part = made.drive.between(made.drive.start, made.drive.start + 640.0)
+    told = fed(scale, part, even(part, 20.0))
     low, high = told.interval()
     assert low < made.scenario.mass + 500.0 < high
     assert high - low < 0.2 * told.mass
@@ -492,9 +494,9 @@ def test_a_mass_that_is_too_wide_is_not_told(weighing, setup, short):
 
 
 def test_a_scale_looks_at_its_records_when_the_vehicle_stands(car, loaded):
-    scale = wb.LiveScale(car, info=loaded.drive.info)
+    scale = wb.LiveScale(car, info=loaded.drive.info, step=LONGEST_STEP)
     part = loaded.drive.between(loaded.drive.start, loaded.drive.start + 400.0)
-    for block in blocks(part, even(part, 2.0)):
+    for block in blocks(part, even(part, LONGEST_STEP)):
         scale.update_block(block)
         if scale._move.driven > scale._move.looked_at + 62.0:
             break
@@ -510,11 +512,10 @@ def test_a_scale_looks_at_its_records_when_the_vehicle_stands(car, loaded):
     assert scale._move.looked_at == scale._move.driven > looked
 
 
-def test_a_withdrawn_mass_stays_withdrawn_over_a_power_cut(weighing, setup, short):
-    scale = wb.LiveScale(weighing.vehicle, setup=setup, info=weighing.drive.info)
-    fed(scale, short, even(short, 20.0))
+def test_a_withdrawn_mass_stays_withdrawn_over_a_power_cut(weighing, half_driven):
+    scale = half_driven
     why = wb.Problem.of("torque.sign", "engine_torque")
-    scale._learned = _nothing(short.end, why, inconsistent=True)
+    scale._learned = _nothing(scale.newest, why, inconsistent=True)
     again = wb.LiveScale.restore(weighing.vehicle, scale.checkpoint())
     assert again.weighing().status is LiveStatus.INCONSISTENT
     assert again.weighing().reason_id == why.id
@@ -522,11 +523,10 @@ def test_a_withdrawn_mass_stays_withdrawn_over_a_power_cut(weighing, setup, shor
     assert np.isnan(again.weighing().mass)
 
 
-def test_tare_and_change_of_load(short, weighing, setup):
-    scale = wb.LiveScale(weighing.vehicle, setup=setup, info=weighing.drive.info)
-    with pytest.raises(ConfigError, match="nothing is weighed yet"):
-        scale.tare()
-    fed(scale, short, even(short, 20.0))
+def test_tare_and_change_of_load(weighing, setup, half_driven):
+    with pytest.raises(ConfigError):
+        wb.LiveScale(weighing.vehicle, setup=setup).tare()
+    scale = half_driven
     scale.tare()
     assert scale.weighing().payload == 0.0
     scale.load_changed()

@@ -1,6 +1,9 @@
 """A recorded drive through feed, scale and outputs, as the command runs it."""
 
+import copy
+from dataclasses import replace
 from threading import Event
+from time import monotonic
 
 import numpy as np
 import pytest
@@ -43,21 +46,19 @@ def run(drive, scale, **more):
     return last, shown.weighings
 
 
-def test_a_replay_is_weighed_as_its_samples(minute, weighing, setup, tmp_path):
-    scale = LiveScale(weighing.vehicle, setup=setup, info=minute.info)
+def test_a_replay_is_weighed_as_its_samples(short, middle, half_driven, tmp_path):
+    minute = short.between(np.nextafter(middle, np.inf), middle + 40.0)
+    scale, direct = half_driven, copy.deepcopy(half_driven)
     keeper = Keeper(tmp_path / "car.state")
     last, shown = run(
         minute, scale, keeper=keeper, recorder=Recorder(tmp_path / "drive"), alerts=[Alert(9e4)]
     )
-    direct = LiveScale(weighing.vehicle, setup=setup, info=minute.info)
     direct.update_block({n: (s.time, s.values) for n, s in minute.signals.items()})
     direct.finish()
     assert last.mass == direct.weighing().mass
     assert last.mass > 0.0
-    assert len(shown) >= 45
+    assert len(shown) >= 20
     assert (tmp_path / "car.state").exists()
-    import weighbridge as wb
-
     kept = wb.read_drive(tmp_path / "drive")
     assert {n: len(s) for n, s in kept.signals.items()} == {
         n: len(s) for n, s in minute.signals.items()
@@ -165,10 +166,9 @@ def test_a_lost_source_is_told_and_weighing_goes_on(minute, weighing, setup):
     assert any("no such device" in note for note in shown.weighings[-1].notes)
 
 
-def test_orders_of_a_person(short, weighing, setup):
-    scale = LiveScale(weighing.vehicle, setup=setup, info=short.info)
-    assert "nothing is weighed yet" in order(scale, "tare")
-    scale.update_block({n: (s.time, s.values) for n, s in short.signals.items()})
+def test_orders_of_a_person(weighing, setup, half_driven):
+    untouched, scale = LiveScale(weighing.vehicle, setup=setup), half_driven
+    assert "nothing is weighed yet" in order(untouched, "tare")
     assert "tare " in order(scale, "tare")
     assert "changed" in order(scale, "load")
     assert "no order: there are tare, load, end" in order(scale, "x")
@@ -181,8 +181,6 @@ def test_a_replay_has_a_rate(minute, rate):
 
 
 def test_a_replay_at_a_rate_takes_its_time(minute):
-    from time import monotonic
-
     part = minute.between(minute.start, minute.start + 2.0)
     blocks, begun = [], monotonic()
     Replay(part, 10.0).run(lambda samples: blocks.append(samples), Event())
@@ -203,10 +201,6 @@ def test_a_replay_leaves_no_sample_between_two_blocks(start):
 
 
 def test_a_replay_does_not_wait_for_days_of_silence(minute):
-    from dataclasses import replace
-
-    import numpy as np
-
     later = minute.with_signals(
         *(
             replace(s, time=np.where(s.time < minute.start + 45.0, s.time, s.time + 10 * 86_400.0))
