@@ -1,16 +1,19 @@
 """How much a command tells: --quiet and --verbose, bars and colours on a terminal."""
 
+import contextlib
 import os
 import pty
 import re
 import subprocess
 import sys
+import threading
 
 import numba
 import pytest
 import typer
-from tests.cli.test_terminal import RUN, started
+from tests.cli.test_terminal import RUN
 
+from weighbridge.cli import main
 from weighbridge.cli.main import app
 from weighbridge.cli.progress import Bar, compiling, time_text
 from weighbridge.cli.verbosity import _leaves
@@ -20,30 +23,40 @@ SMALL = ("--vehicles", "1", "--days", "1", "--drives", "3", "--minutes", "2", "-
 TIME_LEFT = re.compile(r"\d+ s left")
 
 
-def on_a_terminal(*words, **environment):
-    """Run the command line on a terminal of its own; return its exit status and all it wrote."""
-    ours, its = pty.openpty()
-    unset = {"NO_COLOR", "FORCE_COLOR", "TERM", "COLUMNS"}
-    kept = {name: value for name, value in os.environ.items() if name not in unset}
-    done = subprocess.Popen(
-        [sys.executable, "-c", RUN, *map(os.fspath, words)],
-        stdin=its,
-        stdout=its,
-        stderr=its,
-        env={**kept, "TERM": "xterm-256color", "COLUMNS": "90", **environment},
-    )
-    os.close(its)
-    written = b""
-    while True:
-        try:
-            block = os.read(ours, 65536)
-        except OSError:
-            break
-        if not block:
-            break
-        written += block
-    os.close(ours)
-    return done.wait(), written.decode()
+TERMINAL = {"TERM": "xterm-256color", "COLUMNS": "90"}
+
+
+def written_to(terminal, written):
+    """Collect what is written to a terminal until its other end is closed."""
+    with contextlib.suppress(OSError):
+        while block := os.read(terminal, 65536):
+            written.append(block)
+    os.close(terminal)
+
+
+@pytest.fixture
+def on_a_terminal(weighbridge, monkeypatch):
+    """Run a command on a terminal of its own; return its exit status and all it wrote."""
+
+    def run(*words, **environment):
+        ours, its = pty.openpty()
+        written = []
+        reader = threading.Thread(target=written_to, args=(ours, written))
+        reader.start()
+        with monkeypatch.context() as patch, open(its, "w", encoding="utf-8") as terminal:  # noqa: PTH123
+            for name in ("NO_COLOR", "FORCE_COLOR"):
+                patch.delenv(name, raising=False)
+            for name, value in {**TERMINAL, **environment}.items():
+                patch.setenv(name, value)
+            patch.setattr(sys, "stdout", terminal)
+            patch.setattr(sys, "stderr", terminal)
+            patch.setattr(sys, "argv", ["weighbridge", *map(str, words)])
+            with pytest.raises(SystemExit) as leaving:
+                main.run()
+        reader.join(60.0)
+        return leaving.value.code, b"".join(written).decode()
+
+    return run
 
 
 def leaves():
@@ -64,17 +77,16 @@ def test_the_terminal_breaks_the_lines_of_help():
         assert all("\n" not in part for part in command.help.split("\n\n")), command.name
 
 
-@pytest.mark.parametrize("before", [True, False])
-def test_quiet_leaves_the_results(weighbridge, loaded, car, tmp_path, before):
+def test_quiet_leaves_the_results(weighbridge, loaded, car, tmp_path):
     track = tmp_path / "track.csv"
     words = ["weigh", loaded.folder, "--vehicle", car, "--track", track]
     loud = weighbridge(*words)
-    ran = weighbridge(*(["-q", *words] if before else [*words, "--quiet"]))
-    assert ran.code == loud.code == 0
-    assert ran.err == ""
     assert f"written: {track}" in loud.out
-    assert ran.out == loud.out.replace(f"written: {track}\n", "")
-    assert " kg, 95 % between " in ran.out
+    for ran in (weighbridge("-q", *words), weighbridge(*words, "--quiet")):
+        assert ran.code == loud.code == 0
+        assert ran.err == ""
+        assert ran.out == loud.out.replace(f"written: {track}\n", "")
+        assert " kg, 95 % between " in ran.out
 
 
 def test_quiet_leaves_errors(weighbridge, car):
@@ -87,9 +99,9 @@ def test_verbose_logs_each_drive_and_twice_each_stage(weighbridge, loaded, car):
     assert re.search(r"^ *\d+\.\d\d s  io\.read: loaded: \d+ signals", once.err, re.MULTILINE)
     assert "pipeline.weighing: loaded: " in once.err
     assert "coarse mounting" not in once.err
-    for twice in (weighbridge("-v", *words, "-v"), weighbridge(*words, "-vv")):
-        assert "coarse mounting" in twice.err
-        assert twice.out == once.out
+    twice = weighbridge("-v", *words, "-v")
+    assert "coarse mounting" in twice.err
+    assert twice.out == once.out
     assert weighbridge(*words).err == ""
 
 
@@ -100,7 +112,7 @@ def test_both_are_refused(weighbridge):
     assert ran.err.count("\n") == 1
 
 
-def test_a_bar_with_the_time_left_on_a_terminal_alone(tmp_path):
+def test_a_bar_with_the_time_left_on_a_terminal_alone(on_a_terminal, weighbridge, tmp_path):
     code, shown = on_a_terminal("simulate", "fleet", "-o", tmp_path / "a", *SMALL)
     assert code == 0
     assert TIME_LEFT.search(shown)
@@ -108,22 +120,28 @@ def test_a_bar_with_the_time_left_on_a_terminal_alone(tmp_path):
     code, shown = on_a_terminal("simulate", "fleet", "-o", tmp_path / "b", *SMALL, "--quiet")
     assert code == 0
     assert not TIME_LEFT.search(shown)
-    ran = started("simulate", "fleet", "-o", tmp_path / "c", *SMALL)
-    assert (ran.returncode, ran.stderr) == (0, b"")
+    ran = weighbridge("simulate", "fleet", "-o", tmp_path / "c", *SMALL)
+    assert (ran.code, ran.err) == (0, "")
 
 
-def test_colours_on_a_terminal_alone_and_not_where_they_are_unwanted():
+def test_colours_on_a_terminal_alone_and_not_where_they_are_unwanted(on_a_terminal, weighbridge):
     assert COLOUR.search(on_a_terminal("--help")[1])
     for words in (("--help",), ("doctor",)):
         assert not COLOUR.search(on_a_terminal(*words, NO_COLOR="1")[1])
     assert "\x1b" not in on_a_terminal("doctor", TERM="dumb")[1]
-    assert b"\x1b" not in started("--help").stdout
+    assert "\x1b" not in weighbridge("--help").out
 
 
 def test_nothing_is_left_on_the_terminal_after_the_last_line(loaded, car):
-    code, shown = on_a_terminal("weigh", loaded.folder, "--vehicle", car)
-    assert code == 0
-    assert "\\x1b" not in shown
+    """A process of its own: libraries write when it ends."""
+    ours, its = pty.openpty()
+    words = [sys.executable, "-c", RUN, "weigh", loaded.folder, "--vehicle", car]
+    environment, written = {**os.environ, **TERMINAL}, []
+    with subprocess.Popen(words, stdin=its, stdout=its, stderr=its, env=environment) as done:
+        os.close(its)
+        written_to(ours, written)
+    assert done.returncode == 0
+    assert b"\\x1b" not in b"".join(written)
 
 
 def test_the_time_left_is_that_of_the_shares_that_are_left():
@@ -192,12 +210,10 @@ def test_times_are_told_for_people():
         ("weighbridge live --source el", "elm:"),
     ],
 )
-def test_the_shell_completes(typed, offered):
-    environment = {
-        "_WEIGHBRIDGE_COMPLETE": "complete_bash",
-        "COMP_WORDS": typed,
-        "COMP_CWORD": str(len(typed.split()) - 1),
-    }
-    code = f"import sys; sys.argv[0] = 'weighbridge'; {RUN}"
-    ran = started(code=code, **environment)
-    assert offered in ran.stdout.decode().split()
+def test_the_shell_completes(weighbridge, monkeypatch, typed, offered):
+    monkeypatch.setenv("_WEIGHBRIDGE_COMPLETE", "complete_bash")
+    monkeypatch.setenv("COMP_WORDS", typed)
+    monkeypatch.setenv("COMP_CWORD", str(len(typed.split()) - 1))
+    # Named by the program, not by the module that runs the tests.
+    monkeypatch.setattr(sys.modules["__main__"], "__package__", None)
+    assert offered in weighbridge().out.split()
