@@ -36,7 +36,7 @@ def _made(
 @pytest.fixture(scope="session")
 def known(tmp_path_factory) -> Made:
     """Return a calibration drive with its mass in drive.toml."""
-    return _made(tmp_path_factory.mktemp("known") / "known", "car-calibration", 101, 0.0, 1500.0)
+    return _made(tmp_path_factory.mktemp("known") / "known", "car-calibration", 101, 0.0, 900.0)
 
 
 @pytest.fixture(scope="session")
@@ -65,13 +65,10 @@ def car(known, tmp_path_factory) -> Path:
     return path
 
 
-@pytest.fixture
-def changed(loaded, tmp_path) -> Callable[..., Path]:
-    """Copy the loaded drive with some of its tables changed; None leaves a table out."""
-
+def _copies(drive: Path, tmp_path: Path) -> Callable[..., Path]:
     def copy(**tables: Callable[[pl.DataFrame], pl.DataFrame] | None) -> Path:
         folder = tmp_path / "changed"
-        shutil.copytree(loaded.folder, folder)
+        shutil.copytree(drive, folder)
         for table, change in tables.items():
             path = folder / f"{table}.parquet"
             frame = pl.read_parquet(path)
@@ -81,3 +78,15 @@ def changed(loaded, tmp_path) -> Callable[..., Path]:
         return folder
 
     return copy
+
+
+@pytest.fixture
+def changed(loaded, tmp_path) -> Callable[..., Path]:
+    """Copy the loaded drive with some of its tables changed; None leaves a table out."""
+    return _copies(loaded.folder, tmp_path)
+
+
+@pytest.fixture
+def changed_often(often, tmp_path) -> Callable[..., Path]:
+    """Copy the drive with the quick inertial sensor likewise."""
+    return _copies(often.folder, tmp_path)

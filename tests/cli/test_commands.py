@@ -14,6 +14,7 @@ from weighbridge.cli.own_masses import own_masses
 from weighbridge.estimators import ESTIMATORS
 from weighbridge.papers import jensen2022
 from weighbridge.results.weighing import TRACK_COLUMNS
+from weighbridge.simulation import make_scenario, simulate_car
 from weighbridge.vehicle.model import Driveline
 
 COMMANDS = ("demo", "inspect", "calibrate", "weigh", "simulate", "reproduce")
@@ -311,8 +312,8 @@ def test_vehicle_file_for_load_and_a_drive_with_torque_only(weighbridge, car, lo
 
 def test_data_sheet_without_gearings_is_told_to_be_uncalibrated(weighbridge, tmp_path):
     folder = tmp_path / "drive"
-    made = weighbridge("simulate", "electric", "-o", folder, "--seed", 5, "--mass", 1900)
-    assert made.code == 0
+    made = replace(make_scenario("electric", seed=5), duration=600.0)
+    simulate_car(replace(made, payload=1900.0 - made.car.mass)).write(folder)
     sheet = vehicle_file(tmp_path / "sheet.toml", "[torque]\nsource = 'measured'\n")
     ran = weighbridge("weigh", folder, "--vehicle", sheet, "--json", "-")
     assert ran.code == 0
@@ -383,6 +384,7 @@ def test_rows_of_table_b_1_are_as_printed():
 @pytest.mark.slow
 def test_demo(weighbridge, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("weighbridge.cli.demo.DURATION", 700.0)
     ran = weighbridge("demo", "--no-open", "-o", "demo.html")
     assert ran.code == 0
     errors = [float(line.split("│")[-2]) for line in ran.out.splitlines() if " kg │" in line]

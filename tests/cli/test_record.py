@@ -7,7 +7,6 @@ import socket
 import subprocess
 import sys
 import threading
-import time
 from contextlib import contextmanager
 
 import pytest
@@ -16,8 +15,11 @@ from weighbridge.io import read_drive
 
 
 @contextmanager
-def sending():
-    """Send samples to a port of this machine as a device would; yields the port."""
+def sending(heard=None):
+    """Send samples to a port of this machine as a device would; yields the port.
+
+    The event ``heard`` is set once somebody has listened for half a second.
+    """
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
@@ -25,7 +27,8 @@ def sending():
 
     def send():
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as out:
-            k = 0
+            out.connect(("127.0.0.1", port))
+            k = arrived = 0
             while not stop.wait(0.01):
                 row = {
                     **{f"accel_{a}_mps2": 0.1 * k for a in "xyz"},
@@ -35,7 +38,13 @@ def sending():
                     speed = 10.0 + math.sin(0.01 * k)
                     row |= {"vehicle_speed_mps": speed, "engine_speed_rpm": 2000.0}
                     row |= {"engine_load_pct": 40.0, "latitude_deg": 48.0, "longitude_deg": 11.0}
-                out.sendto(json.dumps(row).encode() + b"\n", ("127.0.0.1", port))
+                try:
+                    out.send(json.dumps(row).encode() + b"\n")
+                    arrived += 1
+                except ConnectionRefusedError:
+                    arrived = 0
+                if heard is not None and arrived > 50:
+                    heard.set()
                 k += 1
 
     thread = threading.Thread(target=send)
@@ -59,7 +68,7 @@ def test_a_series_goes_on_beside_what_was_recorded(weighbridge, tmp_path):
 
 def test_samples_of_a_source_become_a_drive(weighbridge, tmp_path):
     with sending() as port:
-        words = ("--source", f"lines:udp:{port}", "-o", tmp_path / "drive", "--duration", "2")
+        words = ("--source", f"lines:udp:{port}", "-o", tmp_path / "drive", "--duration", "1")
         ran = weighbridge("record", *words, "--check", "0.5")
         again = weighbridge("record", *words)
     assert ran.code == 0, ran.err
@@ -78,14 +87,11 @@ def test_samples_of_a_source_become_a_drive(weighbridge, tmp_path):
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_the_recording_and_the_drive_is_whole(tmp_path, number):
     words = [sys.executable, "-m", "weighbridge", "record", "-o", str(tmp_path / "drive")]
-    with sending() as port:
+    heard = threading.Event()
+    with sending(heard) as port:
         words += ["--source", f"lines:udp:{port}", "--check", "0"]
         with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as child:
-            # The folder is made first; then come the sources.
-            while not (tmp_path / "drive").exists():
-                assert child.poll() is None
-                time.sleep(0.05)
-            time.sleep(5.0)
+            assert heard.wait(60.0)
             child.send_signal(number)
             out = child.stdout.read()
     assert child.returncode == 0
