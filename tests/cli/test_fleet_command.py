@@ -105,11 +105,11 @@ def test_a_scheduler_without_a_worker_is_told(weighbridge, fleet, tmp_path, monk
 
     drives, cars = fleet
     results = tmp_path / "results"
-    monkeypatch.setattr(command, "_PATIENCE", 1.0)
+    monkeypatch.setattr(command, "_PATIENCE", 0.3)
     with LocalCluster(
         n_workers=0, processes=False, protocol="tcp", dashboard_address="127.0.0.1:0"
     ) as cluster:
-        helper = threading.Timer(4.0, cluster.scale, [1])
+        helper = threading.Timer(1.5, cluster.scale, [1])
         helper.start()
         ran = weighbridge("fleet", drives, "--vehicles", cars, "-o", results,
                           "--scheduler", cluster.scheduler_address)  # fmt: skip

@@ -1,4 +1,4 @@
-"""The site, built once for the tests that look at it."""
+"""The site, built once for the tests that look at it, or before them: see `.ci/run`."""
 
 import os
 import subprocess
@@ -12,6 +12,8 @@ HOME = Path(__file__).parents[2]
 
 @pytest.fixture(scope="session")
 def site(tmp_path_factory) -> Path:
+    if built := os.environ.get("WEIGHBRIDGE_SITE"):
+        return Path(built)
     folder = tmp_path_factory.mktemp("site")
     subprocess.run(
         [sys.executable, "-m", "mkdocs", "build", "--quiet", "-d", str(folder)],

@@ -47,11 +47,11 @@ def drive(name, payload, seed):
         fast=("vehicle_speed", "engine_speed", "fuel_rate"),
         slow=("ambient_temperature", "barometric_pressure"),
     )
-    return simulate_car(replace(scenario, polling=polling, duration=1500.0))
+    return simulate_car(replace(scenario, polling=polling, duration=800.0))
 
 
 def test_a_package_adds_source_class_and_estimator(package, tmp_path):
-    known, loaded = drive("car-calibration", 0.0, 900), drive("car", 250.0, 901)
+    known, loaded = drive("car-calibration", 0.0, 900), drive("car-short", 250.0, 901)
     made = wb.calibrate(
         known.drive,
         float(known.truth.mass[0]),

@@ -1,6 +1,7 @@
 """A torque that freezes: what was driven after the next stop has no mass."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -33,21 +34,23 @@ def loading():
     return drive, [float(stands[stands < end].max()) for end in (500.0, 870.0)]
 
 
-@pytest.fixture
-def frozen(tmp_path, loading, short_car):
+@pytest.fixture(scope="module")
+def frozen(tmp_path_factory, loading, short_car):
     """Results of the drive with its torque held from an instant on, and what `weigh` says."""
 
+    @cache
     def made(instant):
+        home = tmp_path_factory.mktemp("frozen")
         drive = loading[0]
         load = drive.signals["engine_load"]
         held = np.minimum(np.arange(len(load)), np.searchsorted(load.time, instant))
         drive = drive.with_signals(replace(load, values=load.values[held]))
         drive = replace(drive, info=replace(drive.info, start_time=START, mass=None))
-        cars, drives = tmp_path / "vehicles", tmp_path / "drives"
+        cars, drives = home / "vehicles", home / "drives"
         cars.mkdir()
         replace(short_car, tare=1400.0, gross=2000.0).save(cars / "car.toml")
         write_drive(drive, drives / "car" / "trip", "parquet")
-        results, shelf = Results.begun(tmp_path / "results"), Vehicles(cars)
+        results, shelf = Results.begun(home / "results"), Vehicles(cars)
         for found in recordings([str(drives)]):
             assigned = shelf.of(found.paths, found.vehicle, found.kind)
             weigh_job(Job(recording=found, assigned=assigned, results=str(results.folder)))

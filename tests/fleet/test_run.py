@@ -89,7 +89,8 @@ def test_parts_are_gathered_while_a_run_goes_on(tiny, scheduler, tmp_path, whole
     assert len(gathered) > 3
 
 
-def test_mistakes_are_told_before_the_work(tiny, tmp_path, scheduler):
+def test_mistakes_are_told_before_the_work(tiny, tmp_path, scheduler, monkeypatch):
+    monkeypatch.setattr("weighbridge.fleet.cluster._CONNECT", 0.3)
     drives, cars = tiny
     with pytest.raises(ConfigError, match="unknown method"):
         weigh(tiny, tmp_path / "r", scheduler, method="magic")
@@ -194,7 +195,7 @@ def test_a_drive_that_kills_its_worker_has_a_row(tiny, tmp_path):
         "job.content_digest = digest\n"
     )
     with dask.config.set({"distributed.worker.preload": [str(fault)]}):
-        rows = wb.fleet.weigh_drives(home, cars, tmp_path / "results", workers=2).collect()
+        rows = wb.fleet.weigh_drives(home, cars, tmp_path / "results", workers=1).collect()
     assert rows.height == 14
     (row,) = rows.filter(pl.col("outcome") != "weighed").to_dicts()
     assert (Path(row["source"]).name, row["outcome"]) == ("deadly", "failed")
