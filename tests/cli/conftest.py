@@ -1,7 +1,11 @@
 """Drives and a vehicle file that the commands are tried on, made once."""
 
+import contextlib
+import os
+import pty
 import shutil
 import sys
+import threading
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -12,6 +16,8 @@ import pytest
 
 from weighbridge.cli import main
 from weighbridge.simulation import Sensors, make_scenario, simulate_car
+
+TERMINAL = {"TERM": "xterm-256color", "COLUMNS": "90"}
 
 
 class Made(NamedTuple):
@@ -90,3 +96,36 @@ def changed(loaded, tmp_path) -> Callable[..., Path]:
 def changed_often(often, tmp_path) -> Callable[..., Path]:
     """Copy the drive with the quick inertial sensor likewise."""
     return _copies(often.folder, tmp_path)
+
+
+def written_to(terminal, written):
+    """Collect what is written to a terminal until its other end is closed."""
+    with contextlib.suppress(OSError):
+        while block := os.read(terminal, 65536):
+            written.append(block)
+    os.close(terminal)
+
+
+@pytest.fixture
+def on_a_terminal(weighbridge, monkeypatch):
+    """Run a command on a terminal of its own; return its exit status and all it wrote."""
+
+    def run(*words, **environment):
+        ours, its = pty.openpty()
+        written = []
+        reader = threading.Thread(target=written_to, args=(ours, written))
+        reader.start()
+        with monkeypatch.context() as patch, open(its, "w", encoding="utf-8") as terminal:  # noqa: PTH123
+            for name in ("NO_COLOR", "FORCE_COLOR"):
+                patch.delenv(name, raising=False)
+            for name, value in {**TERMINAL, **environment}.items():
+                patch.setenv(name, value)
+            for name in ("stdin", "stdout", "stderr"):
+                patch.setattr(sys, name, terminal)
+            patch.setattr(sys, "argv", ["weighbridge", *map(str, words)])
+            with pytest.raises(SystemExit) as leaving:
+                main.run()
+        reader.join(60.0)
+        return leaving.value.code, b"".join(written).decode()
+
+    return run

@@ -20,7 +20,9 @@ def cruise(tmp_path_factory):
     return folder
 
 
-def test_a_file_that_weighs_none_of_its_drives_is_told_and_status_1(weighbridge, cruise, tmp_path):
+def test_a_file_that_weighs_none_of_its_drives_tells_it_of_each_it_weighs(
+    weighbridge, cruise, loaded, tmp_path
+):
     output = tmp_path / "car.toml"
     ran = weighbridge("calibrate", cruise, "--mass", "1580", "-o", output)
     assert ran.code == 1
@@ -32,19 +34,14 @@ def test_a_file_that_weighs_none_of_its_drives_is_told_and_status_1(weighbridge,
         d for d in Vehicle.load(output).provenance.doubts if "calibration.own_unweighed" in d
     ]
     assert doubt.partition(": ")[2] in ran.err
+    ran = weighbridge("weigh", loaded.folder, "--vehicle", output)
+    assert says(ran.out, "calibration.own_unweighed", drive="cruise")
 
 
 def test_quiet_does_not_hide_it(weighbridge, cruise, tmp_path):
     ran = weighbridge("calibrate", cruise, "--mass", "1580", "-o", tmp_path / "a.toml", "--quiet")
     assert ran.code == 1
     assert says(ran.err, "calibration.own_unweighed")
-
-
-def test_a_file_tells_it_of_every_drive_it_weighs(weighbridge, cruise, known, tmp_path):
-    output = tmp_path / "car.toml"
-    weighbridge("calibrate", cruise, "--mass", "1580", "-o", output)
-    ran = weighbridge("weigh", known.folder, "--vehicle", output)
-    assert says(ran.out, "calibration.own_unweighed", drive="cruise")
 
 
 def test_one_drive_of_several_without_a_mass_is_told_and_no_failure(car, known, cruise):

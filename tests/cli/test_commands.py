@@ -65,19 +65,6 @@ def test_help_in_a_process_of_its_own_loads_no_arrays():
     assert done.stderr == "loaded: []\n"
 
 
-def test_a_mistake_in_a_process_of_its_own_is_one_line_and_status_2(tmp_path):
-    words = ["weigh", str(tmp_path / "none"), "--vehicle", str(tmp_path / "none.toml")]
-    script = "from weighbridge.cli.main import run; run()"
-    done = subprocess.run(
-        [sys.executable, "-c", script, *words], capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 2
-    assert done.stdout == ""
-    assert done.stderr.startswith("weighbridge: ")
-    assert "none.toml" in done.stderr
-    assert done.stderr.count("\n") == 1
-
-
 def test_unknown_option_is_status_2(weighbridge):
     assert weighbridge("weigh", "--nonsense").code == 2
 

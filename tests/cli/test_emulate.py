@@ -10,6 +10,9 @@ import time
 
 import pytest
 
+from weighbridge.io import read_drive
+from weighbridge.io.write import write_drive
+
 RATE = 8.0
 PROGRAM = (sys.executable, "-m", "weighbridge")
 
@@ -33,9 +36,12 @@ def newest(lines):
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 def test_from_an_emulated_dongle_to_a_mass(loaded, car, tmp_path):
+    drive = read_drive(loaded.folder)
+    set_off = float(drive.speed.time[drive.speed.values > 0.0][0])
+    write_drive(drive.between(set_off - 5.0, drive.end), tmp_path / "moving")
     elm, nmea, lines = free_ports()
     told = tmp_path / "live.jsonl"
-    emulate = [*PROGRAM, "emulate", str(loaded.folder), "--rate", f"{RATE:g}"]
+    emulate = [*PROGRAM, "emulate", str(tmp_path / "moving"), "--rate", f"{RATE:g}"]
     emulate += ["--elm", f"{elm}", "--nmea", f"{nmea}", "--lines", f"{lines}"]
     with subprocess.Popen(emulate, stdout=subprocess.PIPE, text=True) as devices:
         try:

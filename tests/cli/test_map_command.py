@@ -3,10 +3,7 @@
 import json
 import math
 import os
-import pty
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -286,7 +283,7 @@ def test_arrays_are_told_to_have_no_names(weighbridge, tmp_path, named):
     assert "NumPy arrays, which have no names" in ran.err
 
 
-def test_on_a_terminal_the_last_line_names_the_questions(weighbridge, tmp_path):
+def test_on_a_terminal_the_last_line_names_the_questions(weighbridge, on_a_terminal, tmp_path):
     """Nothing is asked without --ask, and a script is not told of it."""
     log, mapping = tmp_path / "x.csv", tmp_path / "m.toml"
     log.write_text("Time,Speed,Load\n" + "".join(f"{k},{k % 9},{k % 90}\n" for k in range(300)))
@@ -294,12 +291,8 @@ def test_on_a_terminal_the_last_line_names_the_questions(weighbridge, tmp_path):
     assert ran.code == 0
     assert "states no unit" in ran.out
     assert "--ask" not in ran.out
-    ours, theirs = pty.openpty()
-    command = [sys.executable, "-m", "weighbridge", "map", log, "-o", mapping, "--force"]
-    subprocess.run(command, stdin=theirs, stdout=theirs, stderr=theirs, check=True, timeout=300)
-    os.close(theirs)
-    told = os.read(ours, 1 << 16).decode()
-    os.close(ours)
+    code, told = on_a_terminal("map", log, "-o", mapping, "--force")
+    assert code == 0
     assert "to be asked about uncertain findings" in told.splitlines()[-1]
     assert "--force --ask" in told.splitlines()[-1]
 

@@ -1,19 +1,17 @@
 """How much a command tells: --quiet and --verbose, bars and colours on a terminal."""
 
-import contextlib
 import os
 import pty
 import re
 import subprocess
 import sys
-import threading
 
 import numba
 import pytest
 import typer
+from tests.cli.conftest import TERMINAL, written_to
 from tests.cli.test_terminal import RUN
 
-from weighbridge.cli import main
 from weighbridge.cli.main import app
 from weighbridge.cli.progress import Bar, compiling, time_text
 from weighbridge.cli.verbosity import _leaves
@@ -21,42 +19,6 @@ from weighbridge.cli.verbosity import _leaves
 COLOUR = re.compile(r"\x1b\[(?:\d+;)*(?:3[0-7]|38;|9[0-7])")
 SMALL = ("--vehicles", "1", "--days", "1", "--drives", "3", "--minutes", "2", "--workers", "1")
 TIME_LEFT = re.compile(r"\d+ s left")
-
-
-TERMINAL = {"TERM": "xterm-256color", "COLUMNS": "90"}
-
-
-def written_to(terminal, written):
-    """Collect what is written to a terminal until its other end is closed."""
-    with contextlib.suppress(OSError):
-        while block := os.read(terminal, 65536):
-            written.append(block)
-    os.close(terminal)
-
-
-@pytest.fixture
-def on_a_terminal(weighbridge, monkeypatch):
-    """Run a command on a terminal of its own; return its exit status and all it wrote."""
-
-    def run(*words, **environment):
-        ours, its = pty.openpty()
-        written = []
-        reader = threading.Thread(target=written_to, args=(ours, written))
-        reader.start()
-        with monkeypatch.context() as patch, open(its, "w", encoding="utf-8") as terminal:  # noqa: PTH123
-            for name in ("NO_COLOR", "FORCE_COLOR"):
-                patch.delenv(name, raising=False)
-            for name, value in {**TERMINAL, **environment}.items():
-                patch.setenv(name, value)
-            patch.setattr(sys, "stdout", terminal)
-            patch.setattr(sys, "stderr", terminal)
-            patch.setattr(sys, "argv", ["weighbridge", *map(str, words)])
-            with pytest.raises(SystemExit) as leaving:
-                main.run()
-        reader.join(60.0)
-        return leaving.value.code, b"".join(written).decode()
-
-    return run
 
 
 def leaves():

@@ -36,7 +36,7 @@ def held(monkeypatch):
 @pytest.fixture(scope="module")
 def minutes(loaded):
     """Looks after 30 s on the move, then each 15 s until there is a mass, and then less often."""
-    return loaded.drive.between(loaded.drive.start, loaded.drive.start + 380.0)
+    return loaded.drive.between(loaded.drive.start, loaded.drive.start + 320.0)
 
 
 def aside(car, drive):

@@ -124,7 +124,7 @@ def test_a_step_that_rounds_is_refused(car):
 
 def test_the_settled_mass_is_as_old_as_lateness_look_ahead_and_step(looked_at, setup):
     """Samples come in blocks of 0.1 s, as from a source."""
-    ages = np.array([a for a in looked_at.ages if np.isfinite(a)])[300:]
+    ages = np.array([a for a in looked_at.ages if np.isfinite(a)])[100:]
     # A torque reading, and so a row, comes a tenth of a second after the one before.
     row = 1.5 * setup.period
     assert np.percentile(ages, 99.0) < LATENESS + lateness(setup) + STEP + row
@@ -134,7 +134,7 @@ def test_the_settled_mass_is_as_old_as_lateness_look_ahead_and_step(looked_at, s
 class LookedAt(NamedTuple):
     """A drive as it comes in blocks of 0.1 s: what is shown of it each second, and what settles.
 
-    ``ages`` are those of the settled mass at each block [s].
+    ``ages`` are those of the settled mass at each third block [s].
     """
 
     shown: list
@@ -146,14 +146,15 @@ def looked_at_each_second(scale, drive, late=0.0):
     """Of ``late`` [s], a third of the samples come so much later than the others."""
     rng, held, shown, settled, shown_at = np.random.default_rng(7), {}, [], [], -np.inf
     ages = []
-    for block in blocks(drive, even(drive, 0.1)):
+    for k, block in enumerate(blocks(drive, even(drive, 0.1))):
         before, held, now = held, {}, {}
         for name, (time, values) in block.items():
             hold = (rng.random(time.size) < 1.0 / 3.0) & (late > 0.0)
             now[name], held[name] = (time[~hold], values[~hold]), (time[hold], values[hold])
         scale.update_block(now)
         scale.update_block(before)
-        ages.append(scale.weighing().age)
+        if k % 3 == 0:
+            ages.append(scale.weighing().age)
         if scale._state is None or not scale._state.joint.windows:
             continue
         if not settled or scale._state.force.time > settled[-1][0]:
@@ -231,7 +232,7 @@ def test_an_open_window_that_is_full_counts_as_the_whole_one(brief, weighing, se
 
 def test_a_scale_learns_and_weighs(car, loaded):
     scale = wb.LiveScale(car, info=loaded.drive.info, step=LONGEST_STEP)
-    drive = loaded.drive.between(loaded.drive.start, loaded.drive.start + 450.0)
+    drive = loaded.drive.between(loaded.drive.start, loaded.drive.start + 380.0)
     statuses = []
     for block in blocks(drive, even(drive, 5.0)):
         scale.update_block(block)
