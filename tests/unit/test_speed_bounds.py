@@ -25,12 +25,12 @@ def test_a_bound_at_part_load_holds_and_is_wide():
     assert found.mass > 1.6 * 1400.0
 
 
-def test_the_bound_holds_in_nearly_all_drives():
+def test_the_bound_holds_in_19_drives_of_20():
     held = [
         wb.mass_bound(climb(1400.0, 60e3, seed=s, seconds=120.0), CAR, 60e3).mass > 1400.0
-        for s in range(10)
+        for s in range(20)
     ]
-    assert sum(held) >= 9
+    assert sum(held) >= 19
 
 
 def test_a_cruise_downhill_bounds_nothing():
