@@ -79,7 +79,7 @@ def main() -> None:
     """Print the files that fit; name on standard error those that do not."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--against", default="main", metavar="BRANCH")
-    parser.add_argument("--budget", type=float, default=80.0, help="time of one process [s]")
+    parser.add_argument("--budget", type=float, default=50.0, help="time of one process [s]")
     args = parser.parse_args()
     tests = {
         path.relative_to(ROOT).as_posix(): imported(path)
