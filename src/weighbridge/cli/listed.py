@@ -97,6 +97,13 @@ def paper_names(incomplete: str) -> list[str]:
     return _beginning((*PAPERS, "all"), incomplete)
 
 
+def slice_names(incomplete: str) -> list[str]:
+    """Slices of the benchmark that begin so."""
+    from weighbridge.benchmark.plan import CALIBRATIONS, CLASSES, EQUIPMENT
+
+    return _beginning((*CLASSES, *EQUIPMENT, *CALIBRATIONS), incomplete)
+
+
 def source_kinds(incomplete: str) -> list[str]:
     """Kinds of live sources that begin so, with the colon behind them."""
     from weighbridge.live.sources import SOURCES

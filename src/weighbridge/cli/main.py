@@ -16,6 +16,7 @@ import typer
 
 from weighbridge import __version__
 from weighbridge.cli import (
+    benchmark,
     bound,
     calibrate,
     coast,
@@ -71,6 +72,7 @@ app.command()(doctor.doctor)
 app.add_typer(vehicle.app, name="vehicle")
 app.add_typer(fleet.app, name="fleet")
 app.add_typer(simulate.app, name="simulate")
+app.add_typer(benchmark.app, name="benchmark")
 
 
 def _print_version(wanted: bool) -> None:

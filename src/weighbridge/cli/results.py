@@ -20,6 +20,7 @@ Kind = Literal[
     "JSON file",
     "track",
     "table of legs",
+    "table of masses",
     "vehicle file",
     "mapping",
     "MF4",
@@ -34,6 +35,7 @@ _BEGINS: Final[dict[Kind, re.Pattern[bytes]]] = {
     # Columns that no drive has and no truth; a Parquet file names them within its first page.
     "track": re.compile(rb"\A[^\r\n]*\btime_s\b[^\r\n]*(?:\bstd_kg\b|\bsprung_mass_std_kg\b)"),
     "table of legs": re.compile(rb"\A[^\r\n]*\bleg\b[^\r\n]*\bpayload_low95_kg\b"),
+    "table of masses": re.compile(rb"\A[^\r\n]*\bdrive\b[^\r\n]*\bmass_kg\b"),
     "vehicle file": re.compile(
         rb"^[ \t]*\[[ \t]*(?:vehicle|driveline|torque|road_load|provenance)[ \t]*\]", re.MULTILINE
     ),
@@ -42,7 +44,7 @@ _BEGINS: Final[dict[Kind, re.Pattern[bytes]]] = {
     "MF4": re.compile(rb"\A(?:MDF     |UnFinMF )"),
 }
 
-_TABLES: Final[frozenset[Kind]] = frozenset({"track", "table of legs"})
+_TABLES: Final[frozenset[Kind]] = frozenset({"track", "table of legs", "table of masses"})
 
 # Bytes in which a file shows what it is.
 _HEAD: Final = 65_536

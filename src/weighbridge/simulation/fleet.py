@@ -17,9 +17,9 @@ from weighbridge.errors import ConfigError
 from weighbridge.signals import Drive, Signal
 from weighbridge.signals.robust import resolution
 from weighbridge.simulation.car import SimulatedCar
-from weighbridge.simulation.named import usual_polling
+from weighbridge.simulation.named import TORQUE_POLLING, usual_polling
 from weighbridge.simulation.route import RoadKind, Route, mixed_route
-from weighbridge.simulation.scenario import Loading, Polling, Scenario, Sensors
+from weighbridge.simulation.scenario import Loading, Scenario, Sensors
 from weighbridge.simulation.simulate import SimulatedDrive, simulate_car
 from weighbridge.simulation.vehicles import BUS, random_habits, random_vehicle, with_random_details
 
@@ -45,12 +45,6 @@ _TORQUES: Final = ("engine_torque", "engine_torque_fraction")
 _DEPOT: Final = (math.radians(51.2), math.radians(9.5))
 _SPREAD: Final = math.radians(0.6)
 _FASTEST: Final = 25.0  # no drive is longer than at this speed all the time [m/s]
-
-_VAN_POLLING: Final = Polling(
-    fast=("vehicle_speed", "engine_speed", "engine_torque_fraction", "throttle"),
-    slow=("reference_torque", "ambient_temperature", "barometric_pressure"),
-    rate=5.0,
-)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -315,7 +309,7 @@ def _scenario(
         seed=int(rng.integers(2**31)),
         habits=random_habits(rng),
         sensors=Sensors(imu_rate=10.0),
-        polling=_VAN_POLLING if vehicle.kind == "van" else usual_polling(vehicle.car),
+        polling=TORQUE_POLLING if vehicle.kind == "van" else usual_polling(vehicle.car),
         wind_speed=float(rng.uniform(0.0, 6.0)),
         wind_from=float(rng.uniform(0.0, 2.0 * math.pi)),
         ambient_temperature=float(rng.uniform(275.0, 298.0)),

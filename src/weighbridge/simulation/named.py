@@ -117,11 +117,13 @@ _TRUCK_POLLING: Final = replace(
     ),
     rate=10.0,
 )
-_TORQUE_POLLING: Final = Polling(
+TORQUE_POLLING: Final = Polling(
     fast=("vehicle_speed", "engine_speed", "engine_torque_fraction", "throttle"),
     slow=("reference_torque", "ambient_temperature", "barometric_pressure"),
     rate=5.0,
 )
+"""Of a vehicle that sends its engine's torque in percent by OBD."""
+
 _DIESEL_POLLING: Final = Polling(
     fast=("vehicle_speed", "engine_speed", "engine_load", "throttle"), rate=5.0
 )
@@ -145,7 +147,7 @@ def usual_polling(car: SimulatedCar) -> Polling:
     if car.electric:
         return _ELECTRIC_POLLING
     if car.transmission == "stepless":
-        return _TORQUE_POLLING
+        return TORQUE_POLLING
     return _DIESEL_POLLING if car.engine == "diesel" else Polling()
 
 

@@ -14,7 +14,14 @@ from weighbridge.simulation.car import ELECTRIC, RPM, SimulatedCar, random_car, 
 from weighbridge.simulation.scenario import Habits
 
 VehicleKind = Literal[
-    "petrol_manual", "petrol_dct", "petrol_cvt", "diesel_automatic", "electric", "van", "truck"
+    "petrol_manual",
+    "petrol_dct",
+    "petrol_cvt",
+    "diesel_automatic",
+    "electric",
+    "van",
+    "truck",
+    "bus",
 ]
 """Kinds of random vehicles."""
 
@@ -309,6 +316,7 @@ def random_vehicle(rng: np.random.Generator, kind: VehicleKind) -> SimulatedCar:
         return with_random_ratios(details, with_random_details(details, _vary(rng, STEPLESS)))
     model = {
         "diesel_automatic": DIESEL_AUTOMATIC, "electric": ELECTRIC, "van": VAN, "truck": TRUCK18,
+        "bus": BUS,
     }[kind]  # fmt: skip
     return with_random_details(details, _vary(rng, model))
 
