@@ -8,12 +8,16 @@ from weighbridge.balance import ForceBalance
 from weighbridge.errors import ConfigError
 from weighbridge.estimators import (
     ekf,
+    fathy,
+    holm,
     hybrid,
     joint,
+    ritter,
     rls,
     robust_rls,
     speed_ekf,
     speed_torque_ekf,
+    vahidi,
 )
 from weighbridge.estimators.settings import changed
 from weighbridge.estimators.track import MassTrack, Segment, Status
@@ -43,6 +47,7 @@ class Estimator:
         the whole drive
     slow_errors : it estimates wind, resistance and their like beside the mass, which its residual
         still holds
+    compared : a comparison of the methods has it; else it weighs where it is named alone
     """
 
     name: str
@@ -54,6 +59,7 @@ class Estimator:
     segments_are_loads: bool = False
     reckons_fuel: bool = False
     slow_errors: bool = False
+    compared: bool = True
 
     def settings_of(self, given: Mapping[str, object]) -> Any:
         """Return settings with some values changed, see `weighbridge.estimators.settings.changed`.
@@ -116,6 +122,34 @@ ESTIMATORS: Final = Registry(
             settings=speed_ekf.SpeedEkfSettings,
             fits=(SPEED_EKF.name,),
             speed_alone=True,
+        ),
+        Estimator(
+            name=vahidi.METHOD,
+            estimate=vahidi.estimate,
+            settings=vahidi.VahidiSettings,
+            fits=_ANY_TORQUE,
+            compared=False,
+        ),
+        Estimator(
+            name=holm.METHOD,
+            estimate=holm.estimate,
+            settings=holm.HolmSettings,
+            fits=_ANY_TORQUE,
+            compared=False,
+        ),
+        Estimator(
+            name=ritter.METHOD,
+            estimate=ritter.estimate,
+            settings=ritter.RitterSettings,
+            fits=_ANY_TORQUE,
+            compared=False,
+        ),
+        Estimator(
+            name=fathy.METHOD,
+            estimate=fathy.estimate,
+            settings=fathy.FathySettings,
+            fits=_ANY_TORQUE,
+            compared=False,
         ),
     ),
 )

@@ -18,7 +18,7 @@ from weighbridge.estimators.judging import consider_std, converged_at, segments
 from weighbridge.estimators.regression import regression
 from weighbridge.estimators.track import MassTrack
 from weighbridge.kernels import rls as kernel
-from weighbridge.signals import Bools, Floats
+from weighbridge.signals import Bools, Floats, Ints
 from weighbridge.signals.robust import spread
 from weighbridge.vehicle.model import Vehicle
 
@@ -233,16 +233,32 @@ def block_jackknife(
     if not used.any():
         return float("nan"), float("inf"), 0
     number = ((time[used] - time[used][0]) // block).astype(np.int64)
-    cross = np.bincount(number, phi[used] * y[used])
-    power = np.bincount(number, phi[used] ** 2)
-    cross, power = cross[power > 0.0], power[power > 0.0]
-    slope = float(cross.sum() / power.sum())
-    if power.size < 3:
-        return slope, float("inf"), int(power.size)
-    without = (cross.sum() - cross) / (power.sum() - power)
-    n = power.size
-    std = float(np.sqrt((n - 1) / n * np.sum((without - without.mean()) ** 2)))
-    return slope, std, int(n)
+    return jackknife(number, phi[used] * y[used], phi[used] ** 2)
+
+
+def jackknife(number: Ints, cross: Floats, power: Floats) -> tuple[float, float, int]:
+    """Ratio of two sums over rows, and its standard deviation by leaving out one block at a time.
+
+    Parameters
+    ----------
+    number : (m,) block of each row, 0 and above
+    cross, power : (m,) terms of both sums; blocks without power say nothing
+
+    Returns
+    -------
+    ratio, std : NaN without blocks; ``std`` infinite below three
+    blocks : number of blocks that say something
+    """
+    above, below = (np.bincount(number, terms).astype(np.float64) for terms in (cross, power))
+    above, below = above[below > 0.0], below[below > 0.0]
+    n = int(below.size)
+    if n == 0:
+        return float("nan"), float("inf"), 0
+    ratio = float(above.sum() / below.sum())
+    if n < 3:
+        return ratio, float("inf"), n
+    without = (above.sum() - above) / (below.sum() - below)
+    return ratio, float(np.sqrt((n - 1) / n * np.sum((without - without.mean()) ** 2))), n
 
 
 def _bound(phi: Floats, residual: Floats, used: Bools) -> float:

@@ -347,16 +347,17 @@ def compare(weighing: Weighing) -> tuple[Weighing, ...]:
 
     Returns
     -------
-    One by each of `weighbridge.estimators.ESTIMATORS`, in their order; a method that could not be
-    tried says why
+    One by each of `weighbridge.estimators.ESTIMATORS` that is ``compared``, in their order, and the
+    one given; a method that could not be tried says why
     """
     check_type("weighing", weighing, Weighing, "what weigh returns")
     found: dict[str, Weighing] = {weighing.method: weighing}
-    for method in ESTIMATORS:
+    methods = [m for m, e in ESTIMATORS.items() if e.compared or m == weighing.method]
+    for method in methods:
         if method not in found:
             joint = found.get(DEFAULT_METHOD)
             found[method] = _by(weighing, method, joint.result if joint is not None else None)
-    return tuple(found[method] for method in ESTIMATORS)
+    return tuple(found[method] for method in methods)
 
 
 def _by(weighing: Weighing, method: str, joined: MassTrack | None) -> Weighing:
