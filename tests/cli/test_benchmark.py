@@ -2,9 +2,11 @@
 
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import polars as pl
 import pytest
+from website import running
 
 import weighbridge as wb
 from weighbridge.benchmark import make
@@ -178,3 +180,21 @@ def test_what_cannot_be_scored_is_one_sentence(scored, text, named):
     assert "mine.csv" in ran.err
     assert named in ran.err
     assert ran.err.count("\n") == 1
+
+
+def test_the_method_of_the_page_weighs_as_its_page_says(weighbridge, tmp_path, monkeypatch):
+    """The blocks of bash and python in docs/benchmark.md."""
+    blocks = running.blocks(Path(__file__).parents[2] / "docs" / "benchmark.md")
+    (commands,) = [block.code for block in blocks if block.language == "bash"]
+    (mine,) = [block.code for block in blocks if block.language == "python"]
+    assert mine.count("\n") < 60
+    monkeypatch.chdir(tmp_path)
+    for line in commands.splitlines():
+        if line == "python mine.py":
+            exec(compile(mine, "mine.py", "exec"), {})
+        else:
+            ran = weighbridge(*line.split()[1:])
+            assert ran.code == 0
+    compared = {row.split()[0]: row.split()[1:] for row in ran.out.splitlines()[1:]}
+    assert compared["joint"][:2] == compared["mine"][:2] == ["2", "0"]
+    assert float(compared["joint"][2]) < float(compared["mine"][2]) < 25.0

@@ -33,8 +33,8 @@ class FathySettings(UnmeasuredGradeSettings):
     ----------
     slow, fast : time constants between which force and acceleration pass [s]: slower changes are
         those of hills, drag and rolling resistance, quicker ones are noise
-    least_change, full_change : a change of the acceleration counts nothing below the first, in full from
-        the second on, and in proportion between [m/s^2]
+    least_change, full_change : a change of the acceleration counts nothing below the first, in
+        full from the second on, and in proportion between [m/s^2]
     """
 
     slow: float = 5.0
