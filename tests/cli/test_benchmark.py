@@ -86,6 +86,8 @@ def test_an_interrupted_benchmark_goes_on_and_becomes_the_same(weighbridge, benc
     assert (part / TRUCK / "vehicle.toml").stat().st_mtime_ns == stays
     assert weighbridge("benchmark", "make", "-o", part, *OPTIONS, "--seed", "2").code == 2
     assert weighbridge("benchmark", "make", "-o", part / TRUCK, *OPTIONS).code == 2
+    (part / "truth.csv").write_text("drive,mass_kg\nx,heavy\n")
+    assert "truth.csv" in weighbridge("benchmark", "make", "-o", part, *OPTIONS).err
     assert weighbridge("benchmark", "make", "-o", tmp_path / "x", "--only", "tram").code == 2
 
 
@@ -100,22 +102,20 @@ def test_a_vehicle_is_the_same_in_every_benchmark_of_a_seed():
     assert all(v.seed != every[v.name].seed for v in plan(replace(whole, seed=2)))
 
 
-def test_every_drive_gets_a_row_and_masses_hold(weighbridge, bench, tmp_path):
-    results = bench / "joint.csv"
-    assert weighbridge("benchmark", "run", bench, "-o", results).code == 0
-    rows = slices(weighbridge("benchmark", "score", results, "--json", "-"))
-    assert rows["all", "all"]["drives"] == 2
-    assert rows["all", "all"]["refused_pct"] == 0.0
-    assert rows["all", "all"]["held_pct"] == 100.0
-    assert rows["calibration", "one"]["rms_pct"] < 5.0
-    # A drive that cannot be read is a refusal with its reason.
+def test_a_drive_that_cannot_be_weighed_is_a_refusal_with_its_reason(weighbridge, bench, tmp_path):
+    results = bench / "rls.csv"
     (bench / TRUCK / "drive-1" / "obd.parquet").rename(tmp_path / "obd.parquet")
     assert weighbridge("benchmark", "run", bench, "--method", "rls", "-o", results).code == 0
     (tmp_path / "obd.parquet").rename(bench / TRUCK / "drive-1" / "obd.parquet")
     refused, weighed = pl.read_csv(results).to_dicts()
     assert refused["mass_kg"] is None
     assert refused["reason"]
-    assert weighed["mass_kg"] > 0.0
+    true = pl.read_csv(bench / "truth.csv")["mass_kg"][1]
+    assert weighed["low_kg"] < true < weighed["high_kg"]
+    assert weighed["mass_kg"] == pytest.approx(true, rel=0.15)
+    rows = slices(weighbridge("benchmark", "score", results, "--json", "-"))
+    assert rows["all", "all"]["refused_pct"] == 50.0
+    assert rows["calibration", "sheet"]["held_pct"] == 100.0
     assert weighbridge("benchmark", "run", bench, "--method", "no", "-o", results).code == 2
     assert weighbridge("benchmark", "run", tmp_path, "-o", results).code == 2
 

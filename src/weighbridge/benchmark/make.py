@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any, Final
@@ -22,6 +22,7 @@ from weighbridge.benchmark.plan import (
     plan,
 )
 from weighbridge.errors import ConfigError
+from weighbridge.io.quiet import PARSE_ERRORS, first_line
 from weighbridge.io.write import write_drive, write_frame
 from weighbridge.signals import Drive, DriveInfo
 from weighbridge.simulation.simulate import SimulatedDrive, simulate_car
@@ -138,8 +139,27 @@ def _begun(
         write_whole(folder / "README.md", _readme(settings, len(drives)))
         write_whole(file, stated)
     if (folder / TRUTH).is_file():
-        return pl.read_csv(folder / TRUTH, schema=TRUTH_COLUMNS)
+        return read_csv(folder / TRUTH, TRUTH_COLUMNS)
     return pl.DataFrame(schema=TRUTH_COLUMNS)
+
+
+def read_csv(path: Path, columns: Mapping[str, pl.DataType]) -> pl.DataFrame:
+    """Read a table of a benchmark.
+
+    Raises
+    ------
+    ConfigError
+        It cannot be read, or has other columns.
+    """
+    try:
+        found = pl.read_csv(path, infer_schema=False)
+        return found.select(pl.col(name).cast(kind) for name, kind in columns.items())
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be read: {error.strerror or error}") from None
+    except PARSE_ERRORS as error:
+        raise ConfigError(
+            f"{path}: is damaged ({first_line(error)}); make the benchmark again in another folder"
+        ) from None
 
 
 def _slice(vehicle: PlannedVehicle) -> dict[str, str]:

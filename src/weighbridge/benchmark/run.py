@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import polars as pl
 
 from weighbridge.arguments import suggestion
-from weighbridge.benchmark.make import DRIVE_COLUMNS, DRIVES, SHEET
+from weighbridge.benchmark.make import DRIVE_COLUMNS, DRIVES, SHEET, read_csv
 from weighbridge.calibration.run import calibrate
 from weighbridge.calibration.settings import CalibrationSettings
 from weighbridge.errors import ConfigError, WeighbridgeError
@@ -38,7 +38,7 @@ def read_drives(folder: Path) -> pl.DataFrame:
     Raises
     ------
     ConfigError
-        The folder is no benchmark.
+        The folder is no benchmark, or its list is damaged.
     """
     path = folder / DRIVES
     if not path.is_file():
@@ -46,7 +46,7 @@ def read_drives(folder: Path) -> pl.DataFrame:
             f"{folder}: is no benchmark, {DRIVES} is missing; make one with weighbridge benchmark "
             "make"
         )
-    return pl.read_csv(path, schema=DRIVE_COLUMNS)
+    return read_csv(path, DRIVE_COLUMNS)
 
 
 def run_benchmark(folder: Path, methods: Sequence[str]) -> Iterator[dict[str, Any]]:
