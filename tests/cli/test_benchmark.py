@@ -11,6 +11,8 @@ from website import running
 import weighbridge as wb
 from weighbridge.benchmark import make
 from weighbridge.benchmark.plan import CALIBRATIONS, BenchmarkSettings, plan
+from weighbridge.benchmark.run import run_benchmark
+from weighbridge.messages import Problem
 
 TRUCK, BY_SHEET = "truck-imu-50hz-one-1", "truck-imu-50hz-sheet-1"
 OPTIONS = (
@@ -118,6 +120,23 @@ def test_a_drive_that_cannot_be_weighed_is_a_refusal_with_its_reason(weighbridge
     assert rows["calibration", "sheet"]["held_pct"] == 100.0
     assert weighbridge("benchmark", "run", bench, "--method", "no", "-o", results).code == 2
     assert weighbridge("benchmark", "run", tmp_path, "-o", results).code == 2
+
+
+def test_methods_weigh_for_themselves_whatever_joint_finds(bench, monkeypatch):
+    def contradicted(track, joined):
+        return Problem.of("method.contradicted", method="rls", mass=1.0, joint_mass=2.0)
+
+    drives = pl.read_csv(bench / "drives.csv")
+    drives.tail(1).write_csv(bench / "drives.csv")
+    monkeypatch.setattr("weighbridge.pipeline.weighing.contradicted", contradicted)
+    rows = {row["method"]: row for row in run_benchmark(bench, ["rls", "holm-ekf"])}
+    drives.write_csv(bench / "drives.csv")
+    assert rows["rls"]["mass_kg"] != rows["holm-ekf"]["mass_kg"]
+    car = wb.Vehicle.load(bench / BY_SHEET / "vehicle.toml")
+    for method, row in rows.items():
+        found = wb.weigh(bench / BY_SHEET / "drive-1", car, method)
+        assert found.reason_id == "method.contradicted"
+        assert row["mass_kg"] == pytest.approx(found.result.mass, abs=0.01)
 
 
 def test_scores_are_those_by_hand(scored):

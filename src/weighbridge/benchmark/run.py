@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import polars as pl
 
@@ -13,15 +14,15 @@ from weighbridge.benchmark.make import DRIVE_COLUMNS, DRIVES, SHEET, read_csv
 from weighbridge.calibration.run import calibrate
 from weighbridge.calibration.settings import CalibrationSettings
 from weighbridge.errors import ConfigError, WeighbridgeError
-from weighbridge.estimators import ESTIMATORS
+from weighbridge.estimators import ESTIMATORS, Status
 from weighbridge.io import read_drive
-from weighbridge.pipeline.weighing import weigh
+from weighbridge.pipeline.weighing import compare, weigh
 from weighbridge.vehicle.model import Vehicle
 
 if TYPE_CHECKING:
     from weighbridge.results.weighing import MassResult
 
-RESULT_COLUMNS = {
+RESULT_COLUMNS: Final = {
     "drive": pl.String(),
     "mass_kg": pl.Float64(),
     "std_kg": pl.Float64(),
@@ -30,6 +31,9 @@ RESULT_COLUMNS = {
     "reason": pl.String(),
 }
 """Columns of a file of results; the first two are needed, and an empty mass is a refusal."""
+
+_BY_JOINT: Final = ("method.contradicted", "method.joint_refuses")
+"""Refusals of a mass because the joint estimator finds another, or none."""
 
 
 def read_drives(folder: Path) -> pl.DataFrame:
@@ -52,6 +56,8 @@ def read_drives(folder: Path) -> pl.DataFrame:
 def run_benchmark(folder: Path, methods: Sequence[str]) -> Iterator[dict[str, Any]]:
     """Weigh every drive with each method, on a vehicle calibrated for it.
 
+    A mass is the method's own: what `weigh` refuses because ``joint`` finds another mass is kept.
+
     Parameters
     ----------
     folder : of the benchmark; its truth is not read
@@ -68,17 +74,17 @@ def run_benchmark(folder: Path, methods: Sequence[str]) -> Iterator[dict[str, An
     ConfigError
         A method is not known, or the folder is no benchmark.
     """
+    by_fit: dict[str, list[str]] = {}
     for method in methods:
         if method not in ESTIMATORS:
             raise ConfigError(f"unknown method {method!r}{suggestion(method, ESTIMATORS)}")
+        by_fit.setdefault(ESTIMATORS[method].fits[0], []).append(method)
     for (name,), drives in read_drives(folder).group_by("vehicle", maintain_order=True):
-        cars: dict[str, Vehicle | WeighbridgeError] = {}
-        for drive in drives["drive"]:
-            for method in methods:
-                fit = ESTIMATORS[method].fits[0]
-                if fit not in cars:
-                    cars[fit] = _calibrated(folder / str(name), fit)
-                yield {"method": method} | _weighed(folder, drive, cars[fit], method)
+        for fit, group in by_fit.items():
+            car = _calibrated(folder / str(name), fit)
+            for drive in drives["drive"]:
+                for method, found in _weighed(folder / drive, car, group).items():
+                    yield {"method": method} | _row(drive, found)
 
 
 def _calibrated(folder: Path, fit: str) -> Vehicle | WeighbridgeError:
@@ -94,15 +100,24 @@ def _calibrated(folder: Path, fit: str) -> Vehicle | WeighbridgeError:
 
 
 def _weighed(
-    folder: Path, drive: str, car: Vehicle | WeighbridgeError, method: str
-) -> dict[str, Any]:
-    empty = dict.fromkeys(RESULT_COLUMNS) | {"drive": drive}
+    drive: Path, car: Vehicle | WeighbridgeError, methods: Sequence[str]
+) -> Mapping[str, MassResult | WeighbridgeError]:
+    """Weigh a drive with methods that take the same vehicle."""
     try:
         if isinstance(car, WeighbridgeError):
             raise car
-        found: MassResult = weigh(read_drive(folder / drive), car, method)
+        first = weigh(read_drive(drive), car, methods[0])
+        return {found.method: found for found in compare(first, methods)}
     except WeighbridgeError as error:
-        return empty | {"reason": str(error)}
+        return dict.fromkeys(methods, error)
+
+
+def _row(drive: str, found: MassResult | WeighbridgeError) -> dict[str, Any]:
+    empty = dict.fromkeys(RESULT_COLUMNS) | {"drive": drive}
+    if isinstance(found, WeighbridgeError):
+        return empty | {"reason": str(found)}
+    if found.reason_id in _BY_JOINT:
+        found = replace(found, status=Status.CONVERGED, refusal=None)
     if found.reason_id is not None:
         return empty | {"reason": found.reason}
     low, high = found.interval()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -335,8 +335,8 @@ def without_mass(
     )
 
 
-def compare(weighing: Weighing) -> tuple[Weighing, ...]:
-    """Weigh a drive with all other methods, after it was weighed with one.
+def compare(weighing: Weighing, methods: Sequence[str] | None = None) -> tuple[Weighing, ...]:
+    """Weigh a drive with other methods, after it was weighed with one.
 
     The drive is not checked again, and forces and motion, which cost most, are
     taken over.
@@ -344,15 +344,17 @@ def compare(weighing: Weighing) -> tuple[Weighing, ...]:
     Parameters
     ----------
     weighing : of the drive, by any method
+    methods : to weigh with; when None those of `weighbridge.estimators.ESTIMATORS` that are
+        ``compared``, in their order, and that of ``weighing``
 
     Returns
     -------
-    One by each of `weighbridge.estimators.ESTIMATORS` that is ``compared``, in their order, and the
-    one given; a method that could not be tried says why
+    One by each method; one that could not be tried says why
     """
     check_type("weighing", weighing, Weighing, "what weigh returns")
     found: dict[str, Weighing] = {weighing.method: weighing}
-    methods = [m for m, e in ESTIMATORS.items() if e.compared or m == weighing.method]
+    if methods is None:
+        methods = [m for m, e in ESTIMATORS.items() if e.compared or m == weighing.method]
     for method in methods:
         if method not in found:
             joint = found.get(DEFAULT_METHOD)
