@@ -50,7 +50,7 @@ def calls(short_drive, short_car, tmp_path_factory):
     return {
         "weigh": (wb.weigh, {"drive": drive, "vehicle": short_car, "method": "rls",
                              "settings": {}, "mapping": None}),
-        "compare": (wb.compare, {"weighing": weighing}),
+        "compare": (wb.compare, {"weighing": weighing, "methods": ["rls"]}),
         "calibrate": (wb.calibrate, {"drives": drive, "mass": 1.0, "vehicle": None,
                                      "settings": None, "mapping": None}),
         "inspect_drive": (wb.inspect_drive, {"drive": drive, "vehicle": None}),

@@ -167,11 +167,9 @@ def weigh(
     DriveError
         The data of the drive cannot be right, for example because of a wrong unit.
     """
-    check_text("method", method)
+    _refuse_unknown(method)
     if settings is not None:
         check_type("settings", settings, Mapping, "a dictionary of values by name")
-    if method not in ESTIMATORS:
-        raise ConfigError(f"unknown method {method!r}{suggestion(method, ESTIMATORS)}")
     chosen = ESTIMATORS[method].settings_of(settings) if settings else None
 
     from weighbridge.checks import mend_drive, refuse_serious
@@ -183,6 +181,12 @@ def weigh(
     kg = (found.mass, found.std)
     _LOG.info("%s: %.0f kg, std %.1f kg, %s by %s", drive.name, *kg, found.status, method)
     return found
+
+
+def _refuse_unknown(method: str) -> None:
+    check_text("method", method)
+    if method not in ESTIMATORS:
+        raise ConfigError(f"unknown method {method!r}{suggestion(method, ESTIMATORS)}")
 
 
 def weigh_checked(drive: Drive, vehicle: Vehicle, method: str, settings: Any = None) -> Weighing:
@@ -350,11 +354,19 @@ def compare(weighing: Weighing, methods: Sequence[str] | None = None) -> tuple[W
     Returns
     -------
     One by each method; one that could not be tried says why
+
+    Raises
+    ------
+    ConfigError
+        A method is not known.
     """
     check_type("weighing", weighing, Weighing, "what weigh returns")
     found: dict[str, Weighing] = {weighing.method: weighing}
     if methods is None:
         methods = [m for m, e in ESTIMATORS.items() if e.compared or m == weighing.method]
+    check_type("methods", methods, Sequence, "a list of names")
+    for method in methods:
+        _refuse_unknown(method)
     for method in methods:
         if method not in found:
             joint = found.get(DEFAULT_METHOD)
