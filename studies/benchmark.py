@@ -26,7 +26,16 @@ from weighbridge.whole import write_whole
 
 PAGE = Path(__file__).parents[1] / "docs" / "benchmark.md"
 BEGIN, END = "<!-- written by studies/benchmark.py -->\n", "<!-- end -->\n"
-HEADS = ("drives", "refused %", "RMS %", "mean %", "95 % hold", "score %", "e²/σ²", "falsely sure")
+HEADS = (
+    "drives",
+    "refused %",
+    "RMS %",
+    "mean %",
+    "95 % hold",
+    "score %",
+    "error²/var",
+    "falsely sure",
+)
 FORMS = ("d", ".0f", ".1f", "+.1f", ".0f", ".0f", ".2f", "d")
 
 
@@ -57,6 +66,17 @@ def table(first: str, named: list[tuple[str, dict]]) -> str:
     return "\n".join(lines) + "\n"
 
 
+def errors(scores: dict[str, list[dict]]) -> str:
+    """Lay out the RMS of every method in every slice but those of routes."""
+    names = [row["slice"] for row in scores["joint"] if row["by"] not in ("all", "route")]
+    lines = [f"| RMS % | {' | '.join(names)} |", "|---" + "|---:" * len(names) + "|"]
+    for method, rows in scores.items():
+        found = {row["slice"]: row["rms_pct"] for row in rows}
+        cells = ["–" if found[name] is None else f"{found[name]:.1f}" for name in names]
+        lines.append(f"| `{method}` | {' | '.join(cells)} |")
+    return "\n".join(lines) + "\n"
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("folder", type=Path)
@@ -77,10 +97,11 @@ def main() -> None:
         f"{made['seed']}, {truth.height} drives.\n"
     )
     every = table("method", [(f"`{name}`", rows[0]) for name, rows in scores.items()])
+    by_slice = errors(scores)
     slices = table("`joint`, slice", [(row["slice"], row) for row in scores["joint"][1:]])
     before, _, rest = PAGE.read_text(encoding="utf-8").partition(BEGIN)
     after = rest.partition(END)[2]
-    write_whole(PAGE, f"{before}{BEGIN}\n{said}\n{every}\n{slices}\n{END}{after}")
+    write_whole(PAGE, f"{before}{BEGIN}\n{said}\n{every}\n{by_slice}\n{slices}\n{END}{after}")
 
 
 if __name__ == "__main__":

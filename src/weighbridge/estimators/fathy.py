@@ -27,7 +27,7 @@ METHOD = "fathy-events"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FathySettings(UnmeasuredGradeSettings):
-    """Settings of filters, supervisor and gate; the paper was not at hand, and all are chosen.
+    """Settings of filters, supervisor and gate; only the abstract was at hand: all are chosen.
 
     Attributes
     ----------
