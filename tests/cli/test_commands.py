@@ -157,7 +157,8 @@ def test_weigh_writes_everything(weighbridge, car, loaded, tmp_path):
     ran = weighbridge(*words, "--track", outputs[".parquet"], "--json", "-")
     assert ran.code == 0
     assert json.loads(ran.out)["status"] == "converged"
-    assert ran.err == f"written: {outputs['.parquet']}\n"
+    layout = tmp_path / "out.parquet.plotjuggler.xml"
+    assert ran.err == f"written: {outputs['.parquet']}\nwritten: {layout}\n"
     csv, parquet = pl.read_csv(outputs[".csv"]), pl.read_parquet(outputs[".parquet"])
     assert csv.columns == parquet.columns == list(TRACK_COLUMNS)
     assert csv.height == parquet.height > 1000

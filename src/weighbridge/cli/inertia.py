@@ -71,7 +71,8 @@ def inertia(
     car = Vehicle.load(vehicle)
     chosen = chosen_mapping(car, vehicle, mapping)
     refuse_results(
-        inputs([drive], vehicle, chosen, dbc), asked_for(track=track, report=report, json=json_path)
+        inputs([drive], vehicle, chosen, dbc),
+        asked_for(ride_track=track, report=report, json=json_path),
     )
     found = estimate_inertia(load(drive, chosen, dbc), car, method, settings=changes)
     if track is not None:

@@ -19,6 +19,8 @@ Kind = Literal[
     "list of items",
     "JSON file",
     "track",
+    "track of a ride",
+    "layout",
     "table of legs",
     "table of masses",
     "vehicle file",
@@ -33,7 +35,12 @@ _BEGINS: Final[dict[Kind, re.Pattern[bytes]]] = {
     "list of items": re.compile(rb"\A# The papers, row by row\b"),
     "JSON file": re.compile(rb"\A\s*\{"),
     # Columns that no drive has and no truth; a Parquet file names them within its first page.
-    "track": re.compile(rb"\A[^\r\n]*\btime_s\b[^\r\n]*(?:\bstd_kg\b|\bsprung_mass_std_kg\b)"),
+    # An MCAP names its writer.
+    "track": re.compile(
+        rb"\A[^\r\n]*\btime_s\b[^\r\n]*\bstd_kg\b|\A\x89MCAP0\r\n.{0,64}?weighbridge", re.DOTALL
+    ),
+    "track of a ride": re.compile(rb"\A[^\r\n]*\btime_s\b[^\r\n]*\bsprung_mass_std_kg\b"),
+    "layout": re.compile(rb"\A[^\r\n]*[\r\n]+<!-- Layout of weighbridge for a track"),
     "table of legs": re.compile(rb"\A[^\r\n]*\bleg\b[^\r\n]*\bpayload_low95_kg\b"),
     "table of masses": re.compile(rb"\A[^\r\n]*\bdrive\b[^\r\n]*\bmass_kg\b"),
     "vehicle file": re.compile(
@@ -44,7 +51,14 @@ _BEGINS: Final[dict[Kind, re.Pattern[bytes]]] = {
     "MF4": re.compile(rb"\A(?:MDF     |UnFinMF )"),
 }
 
-_TABLES: Final[frozenset[Kind]] = frozenset({"track", "table of legs", "table of masses"})
+# Suffixes of tables, and of tracks beside the signals of their drive.
+_TABLES: Final = (".csv", ".parquet")
+_SUFFIXES: Final[dict[Kind, tuple[str, ...]]] = {
+    "track": (*_TABLES, ".mcap", ".mf4"),
+    "track of a ride": _TABLES,
+    "table of legs": _TABLES,
+    "table of masses": _TABLES,
+}
 
 # Bytes in which a file shows what it is.
 _HEAD: Final = 65_536
@@ -121,6 +135,7 @@ def _dbcs_of(mapping: Path | None) -> tuple[str, ...]:
 def asked_for(
     *,
     track: Path | None = None,
+    ride_track: Path | None = None,
     report: Path | None = None,
     json: str | None = None,
     legs: Path | None = None,
@@ -130,7 +145,14 @@ def asked_for(
     if legs is not None:
         found.append(Result("--legs", legs, "table of legs"))
     if track is not None:
+        from weighbridge.results.plotjuggler import layout_of
+
         found.append(Result("--track", track, "track"))
+        beside = layout_of(track)
+        if beside is not None:
+            found.append(Result("--track", beside, "layout"))
+    if ride_track is not None:
+        found.append(Result("--track", ride_track, "track of a ride"))
     if report is not None:
         found.append(Result("--report", report, "report"))
     if json is not None and json != "-":
@@ -156,9 +178,10 @@ def refuse_results(read: Inputs, results: Sequence[Result]) -> None:
     asked: dict[object, Result] = {}
     for result in results:
         path = result.path
-        if result.kind in _TABLES and path.suffix.lower() not in (".csv", ".parquet"):
+        suffixes = _SUFFIXES.get(result.kind)
+        if suffixes is not None and path.suffix.lower() not in suffixes:
             raise ConfigError(
-                f"{result.option} {path}: a {result.kind} is written as .csv or .parquet"
+                f"{result.option} {path}: a {result.kind} is written as {' or '.join(suffixes)}"
             )
         refuse_missing_folder(path)
         if is_stream(path):
@@ -288,11 +311,27 @@ def _is_of_kind(path: Path, kind: Kind) -> bool:
     try:
         with path.open("rb") as file:
             head = file.read(_HEAD)
-            if head[:4] == b"PAR1" and kind in _TABLES:
+            if head[:4] == b"PAR1" and kind in _SUFFIXES:
                 return _BEGINS[kind].search(_columns(path)) is not None
+            if head[:4] == b"MDF " and kind == "track":
+                return _has_track(path)
     except OSError:
         return False
     return not head or _BEGINS[kind].search(head) is not None
+
+
+def _has_track(path: Path) -> bool:
+    """Say whether an MF4 holds a track; not where it is damaged."""
+    from asammdf import MDF
+
+    from weighbridge.io.quiet import quietly
+
+    try:
+        with quietly(), MDF(path) as file:
+            return "track.mass_kg" in file
+    # Damaged files raise errors of many kinds.
+    except Exception:
+        return False
 
 
 def _columns(path: Path) -> bytes:

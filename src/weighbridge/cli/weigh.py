@@ -75,7 +75,9 @@ _Json = Annotated[
 _Track = Annotated[
     Optional[Path],  # noqa: UP045
     typer.Option(
-        "--track", help="Write the mass over time as .csv or .parquet; for one drive only."
+        "--track",
+        help="Write the mass over time as .csv or .parquet; as .mcap or .mf4 beside the signals "
+        "of the drive. For one drive only.",
     ),
 ]
 _Compare = Annotated[
@@ -121,6 +123,7 @@ def weigh(
     """
     from weighbridge.errors import ConfigError
     from weighbridge.estimators.settings import parsed
+    from weighbridge.results.plotjuggler import layout_of
     from weighbridge.vehicle.model import Vehicle
 
     if track is not None and len(drives) > 1:
@@ -131,6 +134,10 @@ def weigh(
         if report is None:
             raise ConfigError("--tiles draws maps of a report; name it with --report FILE.html")
         Tiles(tiles)
+    if track is not None:
+        from weighbridge.io.write import require_writer
+
+        require_writer(track)
     car = Vehicle.load(vehicle)
     chosen = chosen_mapping(car, vehicle, mapping)
     refuse_results(
@@ -169,7 +176,8 @@ def weigh(
     ]
     if not write_json(json_path, "\n".join(lines)):
         _show(rows, failed, compared, car)
-    _tell_written([json_path, track, report], beside_json=json_path == "-")
+    layout = layout_of(track) if track is not None else None
+    _tell_written([json_path, track, layout, report], beside_json=json_path == "-")
     if failed:
         raise typer.Exit(2)
     if any(row.status != "converged" for row in rows):

@@ -1,15 +1,20 @@
-"""Write a drive as a canonical folder, and tables beside it."""
+"""Write a drive as a canonical folder or as MF4, and tables beside it."""
 
 from __future__ import annotations
 
 import contextlib
+import heapq
+import importlib.util
 import io
+import json
 import logging
+import math
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from datetime import UTC, datetime
+from operator import itemgetter
 from pathlib import Path
-from typing import Final, Literal
+from typing import Any, Final, Literal
 
 import numpy as np
 import polars as pl
@@ -22,10 +27,14 @@ from weighbridge.io.parts import SUFFIX as PARTS
 from weighbridge.io.quiet import first_line
 from weighbridge.signals import QUANTITIES, Drive, DriveInfo, Floats, Signal
 from weighbridge.signals.catalogue import TABLES, TIME_COLUMN
-from weighbridge.signals.units import from_si
+from weighbridge.signals.units import UNITS, from_si
+from weighbridge.version import VERSION
 from weighbridge.whole import whole_file, whole_folder
 
 TableFormat = Literal["csv", "parquet"]
+
+# Package and extra, by suffix.
+_WRITTEN_BY: Final = {".mf4": ("asammdf", "mdf"), ".mcap": ("mcap", "ros")}
 
 _PARQUET: Final = (".parquet", ".pq")
 
@@ -84,7 +93,22 @@ def to_frames(drive: Drive) -> dict[str, pl.DataFrame]:
     return {table: _frame(_columns(signals)) for table, signals in every.items() if signals}
 
 
-def write_mdf(drive: Drive, path: str | Path) -> None:
+def require_writer(path: Path) -> None:
+    """Raise where the package that writes a file of this suffix is not installed.
+
+    Raises
+    ------
+    MissingExtraError
+        It names the extra to install.
+    """
+    package, extra = _WRITTEN_BY.get(path.suffix.lower(), ("", ""))
+    if package and importlib.util.find_spec(package) is None:
+        raise MissingExtraError(package, extra, f"writing {path.name}")
+
+
+def write_mdf(
+    drive: Drive, path: str | Path, beside: Mapping[str, pl.DataFrame] | None = None
+) -> None:
     """Write a drive as one MF4, one channel group per clock, compressed.
 
     Channels have canonical names with unit suffixes; what is known beside the
@@ -94,6 +118,8 @@ def write_mdf(drive: Drive, path: str | Path) -> None:
     ----------
     drive : what to write
     path : the file; replaced where it is there
+    beside : further tables with ``time_s``, by name: a channel group each, with channels such as
+        ``track.mass_kg``
 
     Raises
     ------
@@ -103,11 +129,10 @@ def write_mdf(drive: Drive, path: str | Path) -> None:
         asammdf is not installed.
     """
     path = Path(path)
-    try:
-        from asammdf import MDF
-        from asammdf import Signal as Channel
-    except ImportError:
-        raise MissingExtraError("asammdf", "mdf", f"writing {path.name}") from None
+    require_writer(path.with_suffix(".mf4"))
+    from asammdf import MDF
+    from asammdf import Signal as Channel
+
     clocks: dict[int, list[Signal]] = {}
     for s in drive.signals.values():
         clocks.setdefault(id(s.time), []).append(s)
@@ -128,9 +153,94 @@ def write_mdf(drive: Drive, path: str | Path) -> None:
                     name = f"{s.name}_{suffix}" if suffix else s.name
                     channels.append(Channel(values, s.time, name=name, unit=suffix))
                 file.append(channels)
+            for table, frame in (beside or {}).items():
+                time = frame[TIME_COLUMN].to_numpy()
+                channels = []
+                for column in frame.drop(TIME_COLUMN):
+                    suffix = column.name.rpartition("_")[2]
+                    channels.append(
+                        Channel(
+                            _channel_values(column),
+                            time,
+                            name=f"{table}.{column.name}",
+                            unit=suffix if suffix in UNITS else "",
+                            encoding="utf-8" if column.dtype == pl.String else None,
+                        )
+                    )
+                file.append(channels, acq_name=table)
             saved = Path(file.save(part, overwrite=True, compression=2))
         if saved != part:
             saved.replace(part)
+
+
+def _channel_values(column: pl.Series) -> np.ndarray:
+    """Values of a column as MDF holds them: numbers, or bytes of a text."""
+    if column.dtype == pl.String:
+        return np.array([(text or "").encode() for text in column], dtype=np.bytes_)
+    if column.dtype == pl.Boolean:
+        return column.cast(pl.UInt8).to_numpy()
+    return column.to_numpy()
+
+
+def write_mcap(topics: Mapping[str, pl.DataFrame], path: str | Path) -> None:
+    """Write tables as one MCAP with JSON messages, which PlotJuggler and Foxglove read.
+
+    A topic has one message per row, with the cells that are not empty: of a table of a drive
+    (see `to_frames`) the signals that were sampled then, so that each keeps its own clock.
+    Times of messages are those of ``time_s``, moved by whole seconds where they begin below zero,
+    for MCAP counts from zero.
+
+    Parameters
+    ----------
+    topics : tables with ``time_s``, by name of the topic, such as ``/drive/obd``
+    path : the file; replaced where it is there
+
+    Raises
+    ------
+    DriveError
+        The file cannot be written.
+    MissingExtraError
+        mcap is not installed.
+    """
+    path = Path(path)
+    require_writer(path)
+    from mcap.writer import Writer
+
+    starts = [float(frame[TIME_COLUMN][0]) for frame in topics.values() if frame.height]
+    zero = math.floor(min([0.0, *starts]))
+    with whole_file(path, DriveError) as part, part.open("wb") as file:
+        writer: Any = Writer(file)
+        writer.start(library=f"weighbridge {VERSION}")
+        messages = [
+            _messages(frame, _registered(writer, topic, frame), zero)
+            for topic, frame in topics.items()
+        ]
+        for stamp, channel, data in heapq.merge(*messages, key=itemgetter(0)):
+            writer.add_message(channel, log_time=stamp, publish_time=stamp, data=data)
+        writer.finish()
+
+
+def _registered(writer: Any, topic: str, frame: pl.DataFrame) -> int:
+    """Announce a topic of an MCAP with the schema of its messages; return its channel."""
+    kinds = {"String": "string", "Boolean": "boolean"}
+    fields = {k: {"type": kinds.get(str(kind), "number")} for k, kind in frame.schema.items()}
+    schema = writer.register_schema(
+        name=f"weighbridge{topic.replace('/', '.')}",
+        encoding="jsonschema",
+        data=json.dumps({"type": "object", "properties": fields}).encode(),
+    )
+    return int(writer.register_channel(topic=topic, message_encoding="json", schema_id=schema))
+
+
+def _messages(frame: pl.DataFrame, channel: int, zero: float) -> Iterator[tuple[int, int, bytes]]:
+    """Time of each row [ns], its channel, and what it holds as JSON; empty cells are left out."""
+    for row in frame.iter_rows(named=True):
+        held = {
+            k: v
+            for k, v in row.items()
+            if v is not None and (not isinstance(v, float) or math.isfinite(v))
+        }
+        yield round((row[TIME_COLUMN] - zero) * 1e9), channel, json.dumps(held).encode()
 
 
 def write_table(columns: Mapping[str, Floats], path: str | Path) -> None:

@@ -34,6 +34,9 @@ TRACK_COLUMNS: Final = (
     "gear",
     "traction_force_n",
     "reason",
+    "low95_kg",
+    "high95_kg",
+    "residual_n",
 )
 """Columns of the track, as files carry them."""
 
@@ -165,6 +168,7 @@ class MassResult:
         if self.result is None:
             return pl.DataFrame(schema=dict.fromkeys(TRACK_COLUMNS, pl.Float64))
         r, table = self.result, self.result.balance.table
+        reach = float(stdtrit(r.degrees_of_freedom, 0.975)) * r.running_std
         texts = np.array([REASON_TEXT[Reason(k)] for k in range(len(Reason))])
         columns = (
             r.time,
@@ -179,6 +183,9 @@ class MassResult:
             table.gear,
             table.traction_force,
             texts[r.row_reason],
+            r.running_mass - reach,
+            r.running_mass + reach,
+            r.residual,
         )
         return pl.DataFrame(dict(zip(TRACK_COLUMNS, columns, strict=True)), nan_to_null=True)
 
@@ -214,11 +221,18 @@ class MassResult:
         return self.row.to_json()
 
     def write_track(self, path: str | Path) -> None:
-        """Write the track as CSV or Parquet, by the suffix of ``path``.
+        """Write the track, by the suffix of ``path`` as CSV, Parquet, MCAP or MF4.
+
+        MCAP and MF4 hold the signals of the drive too, as they were weighed, each on its own
+        clock. Beside MCAP and Parquet a layout of PlotJuggler is written.
 
         Raises
         ------
         ConfigError
-            The suffix is neither.
+            The suffix is another one, or the file cannot be written.
+        DriveError
+            MCAP or MF4 cannot be written.
+        MissingExtraError
+            The package that writes MCAP or MF4 is not installed.
         """
-        write_track(self.track, path)
+        write_track(self.track, path, self.drive)

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from weighbridge.arguments import check_number, check_path
 from weighbridge.errors import ConfigError
+from weighbridge.whole import write_whole
 
 if TYPE_CHECKING:
     import polars as pl
+
+    from weighbridge.signals import Drive
 
 
 def number(value: float) -> float | None:
@@ -31,17 +34,50 @@ def check_level(level: float) -> None:
         raise ConfigError(f"level must be between 0 and 1, got {level}")
 
 
-def write_track(table: pl.DataFrame, path: str | Path) -> None:
-    """Write a track as CSV or Parquet, by the suffix of ``path``.
+TABLES: Final = (".csv", ".parquet")
+"""Suffixes of a track that is a table alone."""
+
+RECORDINGS: Final = (".mcap", ".mf4")
+"""Suffixes of a track beside the signals of its drive."""
+
+
+def write_track(table: pl.DataFrame, path: str | Path, drive: Drive | None = None) -> None:
+    """Write a track as a table or, beside the signals of its drive, as a recording.
+
+    Parameters
+    ----------
+    table : with ``time_s``
+    path : its suffix, one of `TABLES` or, where a drive is given, `RECORDINGS`, says the format
+    drive : whose signals are written too, each on its own clock; then a layout of PlotJuggler
+        is written beside a file that it reads, see `weighbridge.results.plotjuggler`
 
     Raises
     ------
     ConfigError
-        The suffix is neither, or the file cannot be written.
+        The suffix is another one, or the file cannot be written.
+    DriveError
+        A recording cannot be written.
+    MissingExtraError
+        The package that writes a recording is not installed.
     """
-    from weighbridge.io.write import write_frame
+    from weighbridge.io.write import to_frames, write_frame, write_mcap, write_mdf
+    from weighbridge.results.plotjuggler import layout, layout_of
 
     check_path("path", path)
-    if Path(path).suffix.lower() not in (".csv", ".parquet"):
-        raise ConfigError(f"{path}: a track is written as .csv or .parquet")
-    write_frame(table, path, ConfigError)
+    path = Path(path)
+    suffix = path.suffix.lower()
+    known = TABLES if drive is None else (*TABLES, *RECORDINGS)
+    if suffix not in known:
+        raise ConfigError(f"{path}: a track is written as {' or '.join(known)}")
+    topics: dict[str, pl.DataFrame] = {}
+    if suffix == ".mcap" and drive is not None:
+        topics = {f"/drive/{name}": frame for name, frame in to_frames(drive).items()}
+        topics["/track"] = table
+        write_mcap(topics, path)
+    elif suffix == ".mf4" and drive is not None:
+        write_mdf(drive, path, beside={"track": table})
+    else:
+        write_frame(table, path, ConfigError)
+    beside = layout_of(path)
+    if drive is not None and beside is not None:
+        write_whole(beside, layout(path, table, tuple(topics)))
