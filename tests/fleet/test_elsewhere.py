@@ -8,7 +8,7 @@ import pytest
 
 import weighbridge as wb
 from tests.fleet.fleets import compared, tiny_fleet
-from weighbridge.errors import DriveError, MissingExtraError
+from weighbridge.errors import ConfigError, DriveError, MissingExtraError
 from weighbridge.fleet import remote
 from weighbridge.fleet.inputs import recordings
 
@@ -64,6 +64,23 @@ def test_rows_of_a_store_are_those_of_a_folder(store, scheduler, tmp_path):
     assert there["source"].str.starts_with("s3://fleet/drives/").all()
     assert there.drop("source").equals(here.drop("source"))
     assert there.height == 10
+
+
+def test_results_go_to_a_store_and_duckdb_reads_them_there(store, scheduler, tmp_path, monkeypatch):
+    import duckdb
+    import fsspec
+
+    _, cars = store
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    url = "s3://fleet/results"
+    here = wb.fleet.weigh_drives("s3://fleet/drives/**", cars, url, scheduler=scheduler)
+    base = duckdb.connect()
+    base.register_filesystem(fsspec.filesystem("s3"))
+    there = base.sql(f"select * from read_parquet('{url}/drives/*/*.parquet')").pl()
+    assert sorted(there["key"]) == sorted(here.collect()["key"])
+    assert there.height == 10
+    with pytest.raises(ConfigError, match=r"s3://no-such-bucket/r: cannot be written"):
+        wb.fleet.weigh_drives("s3://fleet/drives/**", cars, "s3://no-such-bucket/r")
 
 
 def test_what_a_store_lists_as_before_is_not_brought_again(store, tmp_path, monkeypatch):

@@ -105,7 +105,7 @@ def test_mistakes_are_told_before_the_work(tiny, tmp_path, scheduler, monkeypatc
     with pytest.raises(ConfigError, match=r"nowhere\.dbc: cannot be read"):
         wb.fleet.weigh_drives(drives, cars, tmp_path / "s", dbc=[f"{tmp_path}/nowhere.dbc"])
     with pytest.raises(ConfigError, match="results go to a folder"):
-        wb.fleet.weigh_drives(drives, cars, "s3://bucket/results")
+        wb.fleet.weigh_drives(drives, cars, Path("s3://bucket/results"))
     assert not (tmp_path / "s").exists()
 
 

@@ -73,11 +73,12 @@ _Vehicles = Annotated[
     ),
 ]
 _Output = Annotated[
-    Path,
+    str,
     typer.Option(
         "-o",
         "--output",
-        help="Folder of the results; drives that have a result there are not weighed again.",
+        help="Folder of the results, or a URL such as s3://bucket/results; drives that have a "
+        "result there are not weighed again.",
         show_default=False,
     ),
 ]
@@ -148,6 +149,7 @@ def run(
     Example: weighbridge fleet 'drives/**' --vehicles vehicles/ -o results/
     """
     from weighbridge.estimators.settings import parsed
+    from weighbridge.fleet.bucket import place_of_results
     from weighbridge.fleet.run import FleetSettings, run_fleet
 
     how = FleetSettings(
@@ -164,13 +166,14 @@ def run(
         tickets=tickets,
     )
     began = time.monotonic()
+    place = place_of_results(results)
     with _progress() as tell:
-        count = run_fleet(drives, vehicles, results, how, tell)
-    found = _summary(results)
+        count = run_fleet(drives, vehicles, place, how, tell)
+    found = _summary(place.folder)
     _say_run(count, time.monotonic() - began)
     _say_summary(found)
     if learn is not None:
-        _say_learnt(results, learn)
+        _say_learnt(place.folder, learn)
     say_written(results)
     if found["unread"] or found["failed"]:
         raise typer.Exit(2)
@@ -180,15 +183,19 @@ def run(
 
 @app.command()
 def status(
-    results: Annotated[Path, typer.Argument(help="Folder of the results.", show_default=False)],
+    results: Annotated[
+        str, typer.Argument(help="Folder of the results, or their URL.", show_default=False)
+    ],
 ) -> None:
     """Show how far a run is: drives weighed, drives without a mass and why, and the time left.
 
     Example: weighbridge fleet status results/
     """
+    from weighbridge.fleet.bucket import brought
     from weighbridge.fleet.store import Results
 
-    opened = Results.opened(results)
+    folder = brought(results)
+    opened = Results.opened(folder)
     told = opened.told()
     if opened.running:
         left = told.get("left_s")
@@ -205,7 +212,7 @@ def status(
         )
     else:
         say("no run is under way")
-    _say_summary(_summary(results))
+    _say_summary(_summary(folder))
 
 
 def _summary(folder: Path) -> dict[str, Any]:

@@ -43,7 +43,9 @@ _Tolerance = Annotated[
 
 
 def report(
-    results: Annotated[Path, typer.Argument(help="Folder of the results.", show_default=False)],
+    results: Annotated[
+        str, typer.Argument(help="Folder of the results, or their URL.", show_default=False)
+    ],
     page: Annotated[
         Optional[Path],  # noqa: UP045
         typer.Option("-o", "--output", help="Page to write, an HTML file that opens offline."),
@@ -72,6 +74,7 @@ def report(
     Example: weighbridge fleet report results/ -o fleet.html --tickets tickets.csv
     """
     from weighbridge.errors import ConfigError
+    from weighbridge.fleet.bucket import brought
     from weighbridge.fleet.legs import Limits
     from weighbridge.fleet.page import write_page
     from weighbridge.fleet.reporting import report as figures
@@ -80,11 +83,12 @@ def report(
         raise ConfigError("--json -: name a file; standard output has the summary")
     read = Inputs(files=tuple(path for path in (tickets, couplings) if path is not None))
     refuse_results(read, asked_for(report=page, json=json, legs=legs))
+    folder = brought(results)
     for path in (page, None if json is None else Path(json), legs):
-        if path is not None and path.resolve().is_relative_to(results.resolve()):
+        if path is not None and path.resolve().is_relative_to(folder.resolve()):
             raise ConfigError(f"{path}: is within the results; name a file elsewhere")
     found = figures(
-        results,
+        folder,
         limits=Limits(warn=warn, alarm=alarm),
         tickets=tickets,
         couplings=couplings,

@@ -55,7 +55,7 @@ def drives(url: str, *, as_drive: bool) -> Iterator[tuple[str, str | None]]:
     MissingExtraError
         fsspec, or what it needs for this kind of URL, is not installed.
     """
-    files, root = _store(url)
+    files, root = opened_store(url)
     try:
         # What changed since an earlier listing of this process counts, too.
         files.invalidate_cache()
@@ -94,7 +94,7 @@ def _stamp(files: Mapping[str, Mapping[str, Any]]) -> str | None:
 def exists(url: str) -> bool:
     """Say whether something is behind a URL; true where the store cannot be asked."""
     try:
-        files, path = _store(url)
+        files, path = opened_store(url)
         return bool(files.exists(path))
     except Exception:  # each store has errors of its own
         return True
@@ -132,7 +132,7 @@ def fetch(urls: Sequence[str], folder: Path) -> list[Path]:
     """
     brought = []
     for url in urls:
-        files, path = _store(url)
+        files, path = opened_store(url)
         name = path.rstrip("/").rpartition("/")[2]
         target = folder / name
         if files.isdir(path):
@@ -148,12 +148,25 @@ def fetch(urls: Sequence[str], folder: Path) -> list[Path]:
     return brought
 
 
-def _store(url: str) -> tuple[Any, str]:
-    """File system of a URL and the path in it."""
+def opened_store(url: str, purpose: str = "reading") -> tuple[Any, str]:
+    """Return the file system of a URL, and the path in it.
+
+    Parameters
+    ----------
+    url : of any kind that fsspec knows
+    purpose : what it is for, in the words of an error
+
+    Raises
+    ------
+    DriveError
+        The URL is none.
+    MissingExtraError
+        fsspec, or what it needs for this kind of URL, is not installed.
+    """
     try:
         from fsspec.core import url_to_fs
     except ImportError:
-        raise MissingExtraError("fsspec", "fleet", f"reading {visible(url)}") from None
+        raise MissingExtraError("fsspec", "fleet", f"{purpose} {visible(url)}") from None
     try:
         files, path = url_to_fs(url)
     except ImportError as error:
@@ -161,7 +174,7 @@ def _store(url: str) -> tuple[Any, str]:
         if package is None:
             raise DriveError(f"{visible(url)} cannot be read: {error}") from None
         extra = "s3" if package == "s3fs" else None
-        raise MissingExtraError(package, extra, f"reading {visible(url)}") from None
+        raise MissingExtraError(package, extra, f"{purpose} {visible(url)}") from None
     except ValueError as error:
         raise DriveError(f"{url}: {error}") from None
     return files, path

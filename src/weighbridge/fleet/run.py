@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -13,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from weighbridge.arguments import suggestion
 from weighbridge.errors import ConfigError
+from weighbridge.fleet.bucket import Bucket, Folder, kept_at, place_of_results
 from weighbridge.fleet.engine import Count, plain, run_jobs
 from weighbridge.fleet.inputs import Recording, recordings, refuse_missing
 from weighbridge.fleet.job import Job, seen_of
@@ -30,6 +32,7 @@ if TYPE_CHECKING:
 
 _TOLD: Final = 2.0  # between writings of how far the run is [s]
 _GATHER: Final = 5_000  # receipts between gatherings of their parts
+_SEND: Final = 60.0  # at most between sendings of results behind a URL [s]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -102,7 +105,8 @@ def weigh_drives(
     ----------
     drives : paths, patterns such as ``"drives/**"``, URLs, or tables of drives
     vehicles : folder of vehicle files, each named after its vehicle
-    results : folder that is written to; seen by all workers
+    results : folder that is written to, seen by all workers; or a URL such as
+        ``"s3://bucket/results"``, which a folder of this machine is sent to
     method, settings : as of `weighbridge.weigh`
     kind : class of vehicles without a file, whose data sheet is used; None for a car, if another
         vehicle of the fleet has a file
@@ -144,26 +148,34 @@ def weigh_drives(
         tickets=None if tickets is None else Path(tickets),
     )
     told = None if progress is None else lambda count: progress(count.done, count.found)
-    run_fleet([str(one) for one in given], Path(vehicles), Path(results), how, told)
-    return read_drives(results)
+    place = place_of_results(results)
+    run_fleet([str(one) for one in given], Path(vehicles), place, how, told)
+    return read_drives(place.folder)
 
 
 def run_fleet(
     given: Sequence[str],
     vehicles: Path,
-    folder: Path,
+    results: Folder,
     how: FleetSettings,
     tell: Callable[[Count], None] | None = None,
 ) -> Count:
-    """Weigh recordings into a folder of results; see `weigh_drives`.
+    """Weigh recordings into results; see `weigh_drives`.
 
     However it ends, what was weighed is in the results.
+
+    Parameters
+    ----------
+    given, vehicles, how : as of `weigh_drives`
+    results : as of `weighbridge.fleet.bucket.place_of_results`
+    tell : called with how far the run is
     """
     from weighbridge.fleet.cluster import check_cluster, connected
 
     check_cluster(how.scheduler, how.workers, how.memory)
-    with prepared(given, vehicles, folder, how) as jobs:
-        teller = _Teller(Results(folder), tell)
+    folder = results.folder
+    with kept_at(results, how.scheduler), prepared(given, vehicles, folder, how) as jobs:
+        teller = _Teller(Results(folder), tell, results)
         try:
             with connected(how.scheduler, how.workers, how.memory) as client:
                 count = run_jobs(client, jobs, teller)
@@ -209,7 +221,9 @@ def prepared(
     if how.kind is None:
         found = _with_a_file(found, shelf, vehicles)
     if was_url(folder):
-        raise ConfigError(f"{folder}: results go to a folder; mount the store, or copy them there")
+        raise ConfigError(
+            f"{folder}: results go to a folder here; mount the store, or copy them there"
+        )
     databases = _dbc_digest(how.dbc)
     results = Results.begun(folder)
     with results.locked():
@@ -315,8 +329,13 @@ def _known_file(results: Results) -> Path | None:
 class _Teller:
     """Writes how far a run is, gathers parts now and then, and reports to whoever asked."""
 
-    def __init__(self, results: Results, tell: Callable[[Count], None] | None) -> None:
+    def __init__(
+        self, results: Results, tell: Callable[[Count], None] | None, place: Folder
+    ) -> None:
         self._results = results
+        self._place = place
+        self._every = _SEND if isinstance(place, Bucket) else math.inf
+        self._sent = time.monotonic()
         self._tell = tell
         self._last = -_TOLD
         self._count = Count()
@@ -331,7 +350,8 @@ class _Teller:
         if time.monotonic() - self._last >= _TOLD:
             self._last = time.monotonic()
             self._write(ended=False)
-            if count.done - self._gathered >= _GATHER:
+            new = count.done - self._gathered
+            if new >= _GATHER or (new and self._last - self._sent >= self._every):
                 self._gather()
 
     def settle(self) -> None:
@@ -353,7 +373,12 @@ class _Teller:
                 return
             self._gathering.result()
         self._gathered = self._count.done
-        self._gathering = self._beside.submit(self._results.gather)
+        self._sent = self._last
+        self._gathering = self._beside.submit(self._flush)
+
+    def _flush(self) -> None:
+        self._results.gather()
+        self._place.send(last=False)
 
     def _write(self, *, ended: bool) -> None:
         told: dict[str, Any] = plain(self._count) | {"ended": ended, "at": time.time()}

@@ -251,7 +251,7 @@ class Results:
             Another run writes here.
         """
         with (self.folder / _LOCK).open("ab") as file:
-            if not _lock(file.fileno()):
+            if not lock_file(file.fileno()):
                 raise ConfigError(
                     f"{self.folder}: another run of weighbridge fleet writes here; wait for it, or "
                     "name another folder"
@@ -263,7 +263,7 @@ class Results:
         """Whether a run holds the lock."""
         try:
             with (self.folder / _LOCK).open("rb") as file:
-                return not _lock(file.fileno())
+                return not lock_file(file.fileno())
         except OSError:
             return False
 
@@ -512,7 +512,7 @@ def _whole(path: Path) -> Iterator[None]:
         ) from None
 
 
-def _lock(number: int) -> bool:
+def lock_file(number: int) -> bool:
     """Lock an open file; False where another process has it."""
     if os.name == "nt":
         return True
