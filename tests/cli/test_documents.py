@@ -138,9 +138,12 @@ def test_the_python_of_the_readme_weighs(own_drives, monkeypatch):
     [
         (d, c)
         for d in DOCUMENTS
-        # That of fleets runs on a fleet, in tests/docs/test_blocks.py.
+        # That of fleets runs on a fleet, in tests/docs/test_blocks.py, and that of the benchmark on
+        # one, in tests/cli/test_benchmark.py.
         # Pages for drives of one's own run whole, above.
-        if d.parts[0] == "docs" and not d.name.startswith("fleet") and HOME / d not in EXECUTED
+        if d.parts[0] == "docs"
+        and not d.name.startswith(("fleet", "benchmark"))
+        and HOME / d not in EXECUTED
         if d.as_posix().removeprefix("docs/") not in running.OWN_DRIVES
         for c in blocks(d, "python")
     ],
