@@ -3,9 +3,18 @@
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from weighbridge.pipeline.expected import EXPECTED, MOTIONS, expected
+from weighbridge.pipeline.expected import (
+    ENOUGH,
+    EXPECTED,
+    MOTIONS,
+    chance,
+    excitation,
+    expected,
+)
+from weighbridge.signals import Drive, Signal
 from weighbridge.vehicle.model import Provenance, Vehicle
 
 HOME = Path(__file__).parents[2]
@@ -63,11 +72,39 @@ def test_a_calibrated_file_promises_no_more_than_it_leaves():
         return expected("speed_grade", fast=True, vehicle=made)
 
     assert promised(None) == expected("speed_grade", fast=True)
-    # 2.5 % of the motion beside it.
-    assert promised(0.016) == (3.0, 6.0)
-    low, high = promised(0.06)
-    assert low == pytest.approx(6.5)
-    assert high > low
+    # 2.5 % of the motion beside it, of 1.6 % and of 6 %.
+    ends = np.array([promised(0.016), promised(0.06)])
+    assert ends[1] / ends[0] == pytest.approx(np.hypot(6.0, 2.5) / np.hypot(1.6, 2.5), rel=0.03)
+    low, high = ends[0]
+    assert low < np.hypot(1.6, 2.5) < high
+
+
+def cosine(duration, rise):
+    """Drive whose speed is a cosine with a period of 60 s."""
+    time = np.arange(0.0, duration + 0.1, 0.25)
+    speed = 15.0 + rise * np.cos(2.0 * np.pi * time / 60.0)
+    return Drive("d", {"vehicle_speed": Signal("vehicle_speed", time, speed)})
+
+
+def test_excitation_is_the_integral_of_the_squared_acceleration():
+    found = excitation(cosine(1200.0, 8.0))
+    assert found.energy == pytest.approx(0.5 * 1200.0 * (2.0 * np.pi * 8.0 / 60.0) ** 2, rel=0.01)
+    assert found.driven == pytest.approx(1200.0, abs=4.0)
+    parked = Signal("vehicle_speed", np.arange(600.0), np.zeros(600))
+    assert excitation(Drive("d", {"vehicle_speed": parked})) == (0.0, 0.0)
+    assert excitation(Drive("d", {})) == ENOUGH
+
+
+@pytest.mark.parametrize("motion", MOTIONS)
+def test_less_driving_promises_less(motion):
+    car = Vehicle(provenance=Provenance(mass_scale_std=0.01))
+    drives = [excitation(cosine(1200.0, rise)) for rise in (8.0, 4.0, 1.0, 0.0)]
+    for vehicle in (None, car):
+        ends = [expected(motion, fast=True, vehicle=vehicle, drive=d) for d in drives[:3]]
+        assert ends == sorted(ends)
+        assert len(set(ends)) == 3
+    assert [chance(motion, d) for d in (drives[0], drives[-1])] == ["sure", "none"]
+    assert chance(motion, excitation(cosine(300.0, 8.0))) == "unsure"
 
 
 @pytest.mark.parametrize("fast", [True, False])

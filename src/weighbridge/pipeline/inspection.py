@@ -12,7 +12,15 @@ import numpy as np
 from weighbridge.balance.speed_balance import SPEEDS
 from weighbridge.checks import mend_drive
 from weighbridge.navigation.motion import MotionSource
-from weighbridge.pipeline.expected import EXPECTED, FAST, MOTIONS, expected
+from weighbridge.pipeline.expected import (
+    EXPECTED,
+    FAST,
+    MOTIONS,
+    Excitation,
+    chance,
+    excitation,
+    expected,
+)
 from weighbridge.pipeline.given import (
     GivenDrive,
     GivenVehicle,
@@ -86,8 +94,9 @@ class Way:
         "speed" where it is taken as proportional to the speed
     possible : whether nothing is missing
     needs : what is missing
-    accuracy : what to expect of the mass after a calibration, as a standard deviation; "none"
-        where no mass comes of it
+    accuracy : what to expect of the mass after a calibration, as a standard deviation, such as
+        "0.4–3 %"; ", or no mass" where the drive may be too short or too even; "none" where no mass
+        comes of it
     because : what limits it
     chosen : the way `weigh` would go with the vehicle file given
     """
@@ -213,7 +222,9 @@ def inspect_drive(drive: GivenDrive, vehicle: GivenVehicle | None = None) -> Ins
         drive=drive,
         signals=tuple(describe(s) for s in signals),
         problems=tuple(sorted(dict.fromkeys(problems), key=lambda p: not p.serious)),
-        ways=_ways(drive if along is None else drive.with_signals(along), vehicle),
+        ways=_ways(
+            drive if along is None else drive.with_signals(along), vehicle, excitation(mended)
+        ),
     )
 
 
@@ -252,16 +263,22 @@ def describe(signal: Signal) -> SignalReport:
     )
 
 
-def _ways(drive: Drive, vehicle: Vehicle | None) -> tuple[Way, ...]:
+def _ways(drive: Drive, vehicle: Vehicle | None, moves: Excitation) -> tuple[Way, ...]:
     ways = []
     for motion in MOTIONS:
         for torque in TORQUE_SOURCES.values():
             needs = (*_motion_needs(drive, motion), *_torque_needs(drive, torque, vehicle))
             fast = _is_fast(drive, torque)
-            best, worst = expected(motion, fast=fast, vehicle=_made_for(torque, vehicle))
+            made = _made_for(torque, vehicle)
+            best, worst = expected(motion, fast=fast, vehicle=made, drive=moves)
             reason = EXPECTED[motion, fast][2]
             if torque.expected:
                 best, worst, reason = best + torque.expected, worst + torque.expected, torque.limit
+            accuracy = f"{best:g}–{worst:g} %"
+            outcome = chance(motion, moves)
+            if outcome != "sure":
+                reason = "the drive is short, or accelerates too little"
+                accuracy = "none" if outcome == "none" else f"{accuracy}, or no mass"
             # Nobody records torque at the wheels for want of another signal.
             rare = bool(needs) and torque.gearing is not None and bool(torque.lacking(drive))
             # What a vehicle file can state need not be recorded.
@@ -274,7 +291,7 @@ def _ways(drive: Drive, vehicle: Vehicle | None) -> tuple[Way, ...]:
                         torque=torque.name,
                         possible=not needs,
                         needs=tuple(dict.fromkeys(needs)),
-                        accuracy=f"{best:g}–{worst:g} %",
+                        accuracy=accuracy,
                         because=reason,
                     ),
                 )
