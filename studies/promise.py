@@ -54,8 +54,12 @@ WAYS: Final[dict[str, Callable[[Drive], Drive]]] = {
     name: (EQUIPMENT | OTHER_EQUIPMENT)[name]
     for name in ("full", "one axis", "no IMU", "no IMU, OBD 1 Hz", "speed alone")
 }
-OTHER_TORQUE: Final = ("traction_force", "wheel_torque", "engine_power")
-"""Torque sources that are made of the truth of the second model, with 1 % of noise."""
+OTHER_TORQUE: Final = {
+    "traction_force": "traction_force",
+    "wheel_torque": "wheel_torque",
+    "engine_power": "power",
+}
+"""Signals that are made of the truth of the second model, with 1 % of noise, and their source."""
 
 
 class Made(NamedTuple):
@@ -134,8 +138,8 @@ def _subjects() -> Iterator[tuple[str, Known, str | None]]:
         yield f"second {kind}", _second(kind, k), None
     for k, kind in enumerate(OWN):
         yield f"own {kind}", _own(kind, k), None
-    for k, torque in enumerate(OTHER_TORQUE):
-        yield f"second {torque}", _second("diesel" if k else "van", 20 + k, torque), torque
+    for k, (signal, source) in enumerate(OTHER_TORQUE.items()):
+        yield f"second {signal}", _second("diesel" if k else "van", 20 + k, signal), source
 
 
 def _rows(name: str, known: Known, torque: str | None) -> Iterator[dict[str, object]]:
