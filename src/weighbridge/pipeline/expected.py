@@ -62,7 +62,7 @@ _KEPT: Final[dict[MotionSource, _Kept]] = {
     "speed_grade": _Kept(33.0, 1.45, 0.58, 1.65),
     "speed": _Kept(37.0, 1.5, 0.5, 1.65),
 }
-"""Fitted by studies/promise.py to 440 weighings of vehicles of seed 7300."""
+"""Fitted by studies/corpus/promise.py to 440 weighings of vehicles of seed 7300."""
 
 _UNSURE: Final = 2.5
 """Standard deviation by the drive alone from which a mass may not come [%]."""
