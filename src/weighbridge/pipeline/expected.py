@@ -76,6 +76,9 @@ _SHORT: Final = 400.0
 _SLOW: Final = 2.0
 """Speed below which a vehicle counts as standing [m/s]."""
 
+_SPARSE: Final = 60.0
+"""Longest mean period of a speed that shows an acceleration [s]."""
+
 _SPACING: Final = 1.0
 _BASE: Final = 2
 """Samples of speed for an acceleration: their spacing [s], and how many steps it spans."""
@@ -101,11 +104,14 @@ ENOUGH: Final = Excitation(math.inf, math.inf)
 def excitation(drive: Drive) -> Excitation:
     """Return how much a drive moves, from its speed by differences over two seconds.
 
-    Without a speed it is `ENOUGH`: what other signals show is not judged.
+    Without a speed it is `ENOUGH`: what other signals show is not judged. A speed with fewer than
+    one sample in `_SPARSE` shows none.
     """
     speed = drive.speed
     if speed is None or len(speed) < 2:
         return ENOUGH
+    if speed.duration > _SPARSE * len(speed):
+        return Excitation(0.0, 0.0)
     time = np.arange(speed.time[0], speed.time[-1], _SPACING)
     v = np.abs(np.interp(time, speed.time, speed.values))
     accel = (v[_BASE:] - v[:-_BASE]) / (_BASE * _SPACING)
