@@ -23,7 +23,16 @@ from weighbridge.errors import ConfigError
 from weighbridge.estimators.regression import regression
 from weighbridge.report.calibration_panels import calibration_facts
 from weighbridge.signals import Signal
-from weighbridge.simulation import Sensors, make_scenario, simulate_car
+from weighbridge.simulation import (
+    Scenario,
+    Sensors,
+    jensen_route,
+    make_scenario,
+    random_habits,
+    random_vehicle,
+    simulate_car,
+    usual_polling,
+)
 from weighbridge.vehicle.model import Driveline, TorqueModel
 from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
 
@@ -400,6 +409,46 @@ def test_a_drive_without_the_accelerometer_of_its_calibration_says_so(empty, car
     assert not any(t.id == "motion.no_accelerometer" for t in weigh(empty.drive, car).problems)
 
 
+def test_thirds_of_the_drives_show_how_masses_scatter(monkeypatch, car, loaded):
+    """Errors of three, three and no standard deviations, beside what is expected beforehand."""
+    balance = weigh(loaded.drive, car).result.balance
+    left = 2000.0
+    mass = left + float(balance.table.fuel_burnt[-1])
+    parts, errors = [], iter((1.03, 0.97, 1.0))
+
+    def estimate(part, _, load_changes):
+        parts.append(part.table.usable)
+        return SimpleNamespace(
+            mass=next(errors) * left,
+            bound_std=0.01 * left,
+            sensitivity=np.zeros(1),
+            shape_sensitivity=np.zeros(18),
+        )
+
+    monkeypatch.setattr(self_weighing.joint, "estimate", estimate)
+    monkeypatch.setattr(self_weighing, "rebalanced", lambda problem, car: [balance])
+    factor = self_weighing.part_scatter(SimpleNamespace(masses=[mass], recordings=()), car)
+    assert factor == pytest.approx(np.sqrt((6.0 * 1.6**2 + 2.0 * 3.0**2) / (6.0 + 2.0)))
+    np.testing.assert_array_equal(np.sum(parts, axis=0), balance.table.usable)
+    counts = np.sum(parts, axis=1)
+    assert np.ptp(counts) <= 1
+
+
+def test_what_scatters_more_in_the_calibration_is_less_sure_later(car, loaded):
+    def own_std(factor):
+        made = replace(car.provenance, std_factor=factor)
+        found = weigh(loaded.drive, replace(car, provenance=made)).result
+        return np.sqrt(found.std**2 - found.systematic_std**2)
+
+    assert car.provenance.std_factor == pytest.approx(1.4, abs=0.4)
+    assert own_std(2.0) == pytest.approx(2.0 * own_std(1.0), rel=0.02)
+
+
+UNBURNT = SimpleNamespace(
+    table=SimpleNamespace(fuel_burnt=np.zeros(2), torque=np.ones(2), usable=np.ones(2, dtype=bool))
+)
+
+
 def test_a_mass_that_jumps_with_the_scale_does_not_mislead_the_calibration(monkeypatch):
     """Levels of noise fall into another optimum at some scales, and the mass jumps."""
     base = Vehicle(torque=TorqueModel(source="measured", coefficients=(0.0, 1.0)))
@@ -408,18 +457,22 @@ def test_a_mass_that_jumps_with_the_scale_does_not_mislead_the_calibration(monke
         scale = car.torque.coefficients[1]
         jump = 60.0 if 1.1 < scale < 1.2 else 0.0
         mass = 6800.0 + 1.3 * 6800.0 * (scale - 1.0) - jump
-        return SimpleNamespace(mass=mass, bound_std=30.0, sensitivity=np.zeros(1))
+        return SimpleNamespace(
+            mass=mass, bound_std=30.0, sensitivity=np.zeros(1), shape_sensitivity=None
+        )
 
     monkeypatch.setattr(self_weighing.joint, "estimate", estimate)
-    burnt = SimpleNamespace(table=SimpleNamespace(fuel_burnt=np.zeros(2)))
     problem = SimpleNamespace(masses=[8400.0], source=TORQUE_SOURCES["measured"])
-    monkeypatch.setattr(self_weighing, "rebalanced", lambda problem, car: [burnt])
+    monkeypatch.setattr(self_weighing, "rebalanced", lambda problem, car: [UNBURNT])
+    monkeypatch.setattr(self_weighing, "part_scatter", lambda problem, car: 1.6)
     scaled = self_weighing.self_weighed(problem, base, None, self_weighing.BY_JOINT)
     assert estimate(None, scaled, False).mass == pytest.approx(8400.0, rel=1e-3)
     assert scaled.provenance.mass_scale_std < 0.015
 
     def stuck(_, car, load_changes):
-        return SimpleNamespace(mass=6800.0, bound_std=30.0, sensitivity=np.zeros(1))
+        return SimpleNamespace(
+            mass=6800.0, bound_std=30.0, sensitivity=np.zeros(1), shape_sensitivity=None
+        )
 
     monkeypatch.setattr(self_weighing.joint, "estimate", stuck)
     lost = self_weighing.self_weighed(problem, base, None, self_weighing.BY_JOINT)
@@ -430,10 +483,12 @@ def test_a_mass_that_jumps_with_the_scale_does_not_mislead_the_calibration(monke
 @pytest.mark.parametrize(("count", "left"), [(1, 0.0170), (4, 0.0134)])
 def test_a_battery_leaves_open_what_differs_from_drive_to_drive(monkeypatch, count, left):
     base = Vehicle(torque=TorqueModel(source="battery", coefficients=(0.0, 1.0)))
-    known = SimpleNamespace(mass=1500.0, bound_std=1e-9, sensitivity=np.zeros(1))
+    known = SimpleNamespace(
+        mass=1500.0, bound_std=1e-9, sensitivity=np.zeros(1), shape_sensitivity=None
+    )
     monkeypatch.setattr(self_weighing.joint, "estimate", lambda *_, **__: known)
-    burnt = SimpleNamespace(table=SimpleNamespace(fuel_burnt=np.zeros(2)))
-    monkeypatch.setattr(self_weighing, "rebalanced", lambda problem, car: [burnt] * count)
+    monkeypatch.setattr(self_weighing, "rebalanced", lambda problem, car: [UNBURNT] * count)
+    monkeypatch.setattr(self_weighing, "part_scatter", lambda problem, car: 1.6)
 
     def made(source):
         problem = SimpleNamespace(masses=[1500.0] * count, source=TORQUE_SOURCES[source])
@@ -539,3 +594,25 @@ def test_torque_on_another_clock_is_refused_with_what_to_add(empty):
     with refused("calibration.torque_clock", reading="engine_load") as told:
         calibrate(early)
     assert told.value.problem.values["by"] == pytest.approx(1.65, abs=0.3)
+
+
+def test_cars_without_an_inertial_sensor_calibrate_by_load():
+    """Cold cars in the wind, whose load bends with engine speed: a curve cannot be the motion."""
+    inertias, rolling = [], []
+    for seed, kind in ((5, "petrol_dct"), (15, "petrol_dct"), (16, "petrol_manual")):
+        rng = np.random.default_rng(seed)
+        simulated = random_vehicle(rng, kind)
+        scenario = Scenario(
+            name="cold", car=simulated, route=jensen_route(1500 + seed), seed=seed,
+            habits=random_habits(np.random.default_rng(seed)), polling=usual_polling(simulated),
+            sensors=Sensors(imu_rate=10.0), duration=800.0, wind_speed=6.0,
+            ambient_temperature=272.0,
+        )  # fmt: skip
+        made = simulate_car(scenario)
+        imu = [name for name in made.drive.signals if name.startswith(("accel", "gyro"))]
+        known = Vehicle(driveline=Driveline(wheel_radius=simulated.wheel_radius))
+        found = calibrate(made.drive.without(*imu), float(made.truth.mass[0]), vehicle=known)
+        inertias.append(found.driveline.engine_inertia / simulated.engine_inertia)
+        rolling.append(found.road_load.rolling_coefficient / simulated.rolling_coefficient)
+    assert np.mean(inertias) < 2.0
+    assert np.mean(rolling) < 2.1

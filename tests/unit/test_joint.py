@@ -13,7 +13,6 @@ from weighbridge.balance.averaging import windows
 from weighbridge.estimators import joint
 from weighbridge.estimators.joint import batch
 from weighbridge.estimators.joint import forward as joint_forward
-from weighbridge.estimators.joint.problem import UNMODELLED
 from weighbridge.estimators.joint.slow_errors import DATA_SHEET_NAMES, design, usable_rows
 from weighbridge.estimators.noisy_motion import too_low
 from weighbridge.report.slow_section import constants_table
@@ -166,7 +165,7 @@ def test_what_the_fit_left_open_reaches_the_interval(balance, car, monkeypatch):
     monkeypatch.setattr(batch, "fit_consider_std", lambda *_: 0.05)
     wide = joint.estimate(balance, car)
     assert wide.mass == real.mass
-    assert wide.std > UNMODELLED * 0.05 * wide.mass
+    assert wide.std > car.provenance.std_factor * 0.05 * wide.mass
 
 
 def test_rows_that_are_no_numbers_are_left_out(balance, car):
@@ -300,7 +299,8 @@ def test_forward_goes_on_from_a_drive_weighed_as_a_whole(balance, car, load):
     nearly = joint_forward.resumed(given, setup, float(given.time[-6]))
     assert nearly.windows == given.time.size - 5
     *_, after = folded(track, stops=0.0, state=nearly)
-    assert after.mass == pytest.approx(end, rel=1e-4)
+    # The hypotheses of the load go on as one.
+    assert after.mass == pytest.approx(end, rel=4e-4)
     assert after.windows == whole.windows
     assert joint_forward.resumed(given, setup, -np.inf) == joint_forward.JointState()
 

@@ -41,7 +41,7 @@ def van(change, *, at=120, every=12, stood=12.0, seed=0):
 
 
 def unaveraged(given):
-    return averaged(replace(given, odds=np.full(WINDOWS, np.nan)), STD, SETTINGS)[0]
+    return averaged(replace(given, odds=np.full(WINDOWS, np.nan)), STD, SETTINGS, UNMODELLED)[0]
 
 
 def std(state):
@@ -53,7 +53,7 @@ def test_a_change_that_was_not_found_is_in_the_interval():
     errors, before = [], []
     for seed in range(12):
         given = van(-240.0, seed=seed)
-        state, _, possible = averaged(given, STD, SETTINGS)
+        state, _, possible = averaged(given, STD, SETTINGS, UNMODELLED)
         same = unaveraged(given)
         errors.append((state.x[0] - true) / std(state))
         before.append((same.x[0] - true) / std(same))
@@ -65,7 +65,7 @@ def test_a_change_that_was_not_found_is_in_the_interval():
 
 def test_a_change_that_is_likely_is_told_with_its_stop():
     given = van(-500.0, seed=1)
-    *_, possible = averaged(given, STD, SETTINGS)
+    *_, possible = averaged(given, STD, SETTINGS, UNMODELLED)
     assert possible.probability > 0.9
     assert possible.time == pytest.approx(given.time[120], abs=1.0)
     # The mass without a change at that stop has followed half of the way.
@@ -78,7 +78,7 @@ def test_a_change_that_is_likely_is_told_with_its_stop():
 def test_stops_without_a_change_widen_little():
     for seed in range(12):
         given = van(0.0, seed=seed, every=40)
-        state, _, possible = averaged(given, STD, SETTINGS)
+        state, _, possible = averaged(given, STD, SETTINGS, UNMODELLED)
         same = unaveraged(given)
         assert abs(state.x[0] - same.x[0]) < std(same)
         assert std(same) < std(state) < 1.7 * std(same)
@@ -91,7 +91,7 @@ def test_where_nothing_can_be_told_nothing_is_changed():
     late = replace(given, odds=np.where(np.arange(WINDOWS) == 232, 1.0, np.nan))
     assert FEWEST * SETTINGS.fewest_windows > WINDOWS - 232
     for none in (late, replace(given, odds=np.full(WINDOWS, np.nan))):
-        state, _, possible = averaged(none, STD, SETTINGS)
+        state, _, possible = averaged(none, STD, SETTINGS, UNMODELLED)
         assert possible is None
         assert_array_equal(state.x, unaveraged(given).x)
 
@@ -102,7 +102,7 @@ def test_a_change_found_that_the_rest_denies_is_averaged_away():
         true = van(0.0, seed=seed, every=40, stood=60.0)
         found = true.added.copy()
         found[120, [0, 2]] = (SETTINGS.change_std * MASS) ** 2, 1.0
-        state, same, possible = averaged(replace(true, added=found), STD, SETTINGS)
+        state, same, possible = averaged(replace(true, added=found), STD, SETTINGS, UNMODELLED)
         errors.append((abs(state.x[0] - MASS), abs(same.x[0] - MASS)))
         assert errors[-1][0] < 2.0 * std(state)
         assert possible.doubtful_time == true.time[120]
@@ -111,7 +111,7 @@ def test_a_change_found_that_the_rest_denies_is_averaged_away():
     assert averaged_error < 0.8 * found_error
     assert np.median(shares) > 0.4
     sure = van(-600.0, seed=1, every=40, stood=60.0)
-    *_, possible = averaged(replace(sure, added=found), STD, SETTINGS)
+    *_, possible = averaged(replace(sure, added=found), STD, SETTINGS, UNMODELLED)
     assert possible.none < 1e-3
 
 
@@ -125,6 +125,6 @@ def test_a_stop_at_which_a_change_was_found_is_not_tried_again():
     given = van(-500.0, seed=1)
     found = given.added.copy()
     found[120, 0] = (SETTINGS.change_std * MASS) ** 2
-    *_, possible = averaged(replace(given, added=found), STD, SETTINGS)
+    *_, possible = averaged(replace(given, added=found), STD, SETTINGS, UNMODELLED)
     assert possible.probability < 0.6
     assert possible.time != given.time[120]

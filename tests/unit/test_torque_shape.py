@@ -21,11 +21,11 @@ def weighed(brief_drive, short_car):
 
 
 def moved(torque, accel):
-    """Mass that a unit of the error at each knot adds, by least squares of force on motion [kg]."""
+    """Mass that a unit of the error at each knot adds, by least squares of force on motion [-]."""
     near = np.maximum(0.0, 1.0 - np.abs(torque[:, None] - KNOTS) / (KNOTS[1] - KNOTS[0]))
     accel = accel - accel.mean()
     full = 2.0 * MASS * np.ptp(accel) / np.ptp(torque)
-    return full * accel @ near / (accel @ accel)
+    return full * accel @ near / (accel @ accel) / MASS
 
 
 def driven(low, high):
@@ -37,18 +37,23 @@ def driven(low, high):
 def test_ordinary_torques_weigh_as_the_calibration_did():
     mean, spread = ORDINARY
     often = np.exp(-0.5 * ((KNOTS - mean) / spread) ** 2)
-    assert shape_std(MASS * (KNOTS - mean) * often, MASS) < 1e-6
-    assert shape_std(MASS * often, MASS) < 1e-6
+    assert shape_std((KNOTS - mean) * often, ()) < 1e-6
+    assert shape_std(often, ()) < 1e-6
+
+
+def test_torques_used_as_in_the_calibration_leave_nothing():
+    use = driven(0.1, 0.9)
+    assert shape_std(use, use) < 1e-6
+    assert shape_std(driven(0.5, 0.7), use) > SHAPE_STD
 
 
 def test_few_torques_leave_more_open_than_many():
-    many, few = shape_std(driven(-0.1, 0.8), MASS), shape_std(driven(0.5, 0.7), MASS)
+    many, few = shape_std(driven(-0.1, 0.8), ()), shape_std(driven(0.5, 0.7), ())
     assert few > 2.0 * many
     assert few > SHAPE_STD
 
 
-def test_no_mass_and_no_torque_leave_nothing(weighed, short_car):
-    assert shape_std(np.ones(KNOTS.size), 0.0) == 0.0
+def test_no_torque_leaves_nothing(weighed, short_car):
     assert not shape_columns(weighed.balance.table, short_car, 0.0).any()
 
 

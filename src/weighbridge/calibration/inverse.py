@@ -244,7 +244,8 @@ def fit(drives: list[DriveRows], settings: FitSettings) -> InverseFit:
     is regressed: ``w1 G L = m f + C_d A q + ... - G (w0 + w2 N + ...)`` is
     divided by w1, which keeps the problem linear. The curvature needs the
     reading on the right as well; there the fitted one of the round before
-    stands in its place, so that no noise enters.
+    stands in its place, so that no noise enters. It is centred: a curve whose
+    mean is not zero would explain the reading by itself.
 
     Parameters
     ----------
@@ -258,17 +259,18 @@ def fit(drives: list[DriveRows], settings: FitSettings) -> InverseFit:
     """
     cuts, total = _cut(drives, settings)
     scale = _torque_per_reading(drives)
+    centre = _centre(drives, settings)
     # The first round is straight: a reading on both sides would explain itself, and where the
     # motion is noisy the motion would explain nothing.
     readings = [np.zeros_like(d.regressor) for d in drives]
     for _ in range(settings.rounds):
-        design = _design(drives, cuts, readings, settings)
+        design = _design(drives, cuts, readings, centre, settings)
         state = _solve(design, [d.regressor for d in drives], scale, settings)
         readings = [
             _fitted(d, columns, state, scale, settings)
             for d, columns in zip(drives, design.columns, strict=True)
         ]
-    return _unpack(state, scale, _extra(settings), total)
+    return _unpack(state, scale, centre, total)
 
 
 def log_likelihoods(
@@ -283,7 +285,8 @@ def log_likelihoods(
     settings
     """
     cuts, _ = _cut(drives, settings)
-    design = _design(drives, cuts, [np.zeros_like(d.regressor) for d in drives], settings)
+    none = [np.zeros_like(d.regressor) for d in drives]
+    design = _design(drives, cuts, none, np.zeros(_extra(settings)), settings)
     found = []
     for each in readings:
         read = [replace(d, regressor=reading) for d, reading in zip(drives, each, strict=True)]
@@ -310,6 +313,30 @@ def _extra(settings: FitSettings) -> int:
     return 1 + settings.order + 2 * settings.curved + len(settings.knots)
 
 
+def _centre(drives: list[DriveRows], settings: FitSettings) -> Floats:
+    """Part of the reading that each torque term beside it takes on the mean of the drives (k,).
+
+    0 of those that do not depend on the reading.
+    """
+    square, common = 0.0, np.zeros(_extra(settings))
+    for d in drives:
+        gearing = np.nan_to_num(d.table.gearing)[d.usable]
+        terms = _terms(d, d.regressor, settings)[d.usable]
+        read = gearing * d.regressor[d.usable]
+        square += float(read @ read)
+        common += read @ np.delete(terms, 1, axis=1)
+    common[: 1 + settings.order] = 0.0
+    return common / square
+
+
+def _terms(d: DriveRows, reading: Floats, settings: FitSettings) -> Floats:
+    """Force of one unit of each torque term at a reading (n, p)."""
+    return law.reading_columns(
+        np.nan_to_num(d.table.gearing), reading, d.engine_speed,
+        order=settings.order, curved=settings.curved, knots=settings.knots,
+    )  # fmt: skip
+
+
 def _torque_per_reading(drives: list[DriveRows]) -> float:
     """Rough torque per unit of reading, to make the first coefficient about one [N m]."""
     slopes = []
@@ -324,7 +351,7 @@ def _torque_per_reading(drives: list[DriveRows]) -> float:
     return float(np.median(slopes))
 
 
-def _columns(d: DriveRows, reading: Floats, settings: FitSettings) -> Floats:
+def _columns(d: DriveRows, reading: Floats, centre: Floats, settings: FitSettings) -> Floats:
     """Columns of one drive: motion, road load, torque terms, disturbances."""
     table = d.table
     north, east = law.wind_columns(table)
@@ -335,15 +362,13 @@ def _columns(d: DriveRows, reading: Floats, settings: FitSettings) -> Floats:
         lasting = lasting_pressure(table)
         pushed = pushed + settings.prior[0][0] * (law.drag_column(table) - lasting)
         road[:, 0] = lasting
-    terms = law.reading_columns(
-        np.nan_to_num(table.gearing), reading, d.engine_speed,
-        order=settings.order, curved=settings.curved, knots=settings.knots,
-    )  # fmt: skip
+    terms = _terms(d, reading, settings)
+    beside = np.delete(terms, 1, axis=1) - np.outer(terms[:, 1], centre)
     columns = [
         pushed,
         *road.T,
         # The reading itself stands on the left; the other torque terms stand here.
-        *-np.delete(terms, 1, axis=1).T,
+        *-beside.T,
         law.gust_column(table, d.motion.unmeasured_grade, usual_gearing=settings.usual_gearing),
         law.resistance_column(table),
         north,
@@ -379,12 +404,18 @@ class _Design(NamedTuple):
 
 
 def _design(
-    drives: list[DriveRows], cuts: list[Windows], readings: list[Floats], settings: FitSettings
+    drives: list[DriveRows],
+    cuts: list[Windows],
+    readings: list[Floats],
+    centre: Floats,
+    settings: FitSettings,
 ) -> _Design:
     """Average the columns of all drives over their windows."""
     mass = float(np.mean([d.mass for d in drives]))
     gearings = [np.nan_to_num(d.table.gearing) for d in drives]
-    columns = [_columns(d, each, settings) for d, each in zip(drives, readings, strict=True)]
+    columns = [
+        _columns(d, each, centre, settings) for d, each in zip(drives, readings, strict=True)
+    ]
     times, variances = [], []
     clock = 0.0
     for d, cut, gearing in zip(drives, cuts, gearings, strict=True):
@@ -459,20 +490,22 @@ def _fitted(
     return np.where(gearing > 0.0, predicted / (scale * np.maximum(gearing, 1e-3)), d.regressor)
 
 
-def _unpack(state: kernel.DisturbanceState, scale: float, extra: int, total: int) -> InverseFit:
+def _unpack(state: kernel.DisturbanceState, scale: float, centre: Floats, total: int) -> InverseFit:
     """Divide by the first coefficient, and carry the covariance along."""
+    extra = centre.size
     x, cov = state.x[: 5 + extra], state.cov[: 5 + extra, : 5 + extra]
     ratio = x[1:] / x[0]
     # Rows: w0, w1, w2 ... with the curvature, then the road. d(a / x0) = (da - a / x0 dx0) / x0.
     slopes = np.zeros((5 + extra, 5 + extra))
     slopes[0, 5], slopes[0, 0] = 1.0, -ratio[4]
-    slopes[1, 0] = -scale / x[0]
+    slope = (scale - float(centre @ x[5:])) / x[0]
+    slopes[1, 0], slopes[1, 5:] = -slope, -centre
     for row, column in enumerate([*range(6, 5 + extra), *range(1, 5)], start=2):
         slopes[row, column], slopes[row, 0] = 1.0, -ratio[column - 1]
     slopes /= x[0]
     cov = slopes @ cov @ slopes.T
     return InverseFit(
-        coefficients=np.concatenate(([ratio[4]], [scale / x[0]], ratio[5:])),
+        coefficients=np.concatenate(([ratio[4]], [slope], ratio[5:])),
         road=ratio[:4],
         stds=np.sqrt(np.maximum(np.diag(cov), 0.0)),
         cov=cov,

@@ -7,6 +7,7 @@ A cruise uses a few torques, and the slope of the bend there is a scale of its o
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
@@ -29,7 +30,7 @@ ORDINARY: Final = (0.34, 0.22)
 [-]; from the same drives."""
 
 KNOTS: Final = np.linspace(-0.5, 1.2, 18)
-"""Torques over the highest of the drive between which the error is interpolated [-]."""
+"""Torques over the highest between which the error is interpolated [-]."""
 
 
 def shape_columns(table: ForceTable, vehicle: Vehicle, highest: float) -> Floats:
@@ -38,7 +39,7 @@ def shape_columns(table: ForceTable, vehicle: Vehicle, highest: float) -> Floats
     Parameters
     ----------
     table, vehicle
-    highest : torque of the drive, which is the unit [N m]
+    highest : torque of the calibration's drives, else of this one, which is the unit [N m]
     """
     torque = np.nan_to_num(table.torque)
     if not highest > 0.0:
@@ -49,33 +50,33 @@ def shape_columns(table: ForceTable, vehicle: Vehicle, highest: float) -> Floats
     return np.asarray(near * np.nan_to_num(gain)[:, None])
 
 
-def shape_std(moved: Floats, mass: float) -> float:
+def shape_std(moved: Floats, use: Sequence[float]) -> float:
     """Relative standard deviation of a mass by the shape of the reading [-].
 
     Parameters
     ----------
-    moved : (k,) how far one unit at each of the `KNOTS` moves the mass [kg]
-    mass : [kg]
+    moved : (k,) how far one unit at each of the `KNOTS` moves the mass, relative [-]
+    use : (k,) how far it moved the masses of the calibration, relative, which has taken that out;
+        empty where it is not known
 
     References
     ----------
     Covariance of a smooth error, and of one of which a sum is known: Rasmussen and Williams,
     Gaussian Processes for Machine Learning, 2006, eqs. 2.31 and 2.19.
     """
-    if not mass > 0.0:
-        return 0.0
-    return float(np.sqrt(max(float(moved @ _COVARIANCE @ moved), 0.0)) / mass)
+    cov = pinned(_SMOOTH, np.array(use)) if len(use) == KNOTS.size else _UNCALIBRATED
+    return float(np.sqrt(max(float(moved @ cov @ moved), 0.0)))
 
 
-def _covariance() -> Floats:
-    """Covariance of the error at the `KNOTS` (k, k) [-].
+def _uncalibrated() -> Floats:
+    """Covariance of the error at the `KNOTS` without a calibration (k, k) [-].
 
-    A calibration has made its sum over ordinary drives zero, and what it adds to their mass.
+    Its sum over ordinary drives is zero, and what it adds to their mass.
     """
-    smooth = np.exp(-0.5 * ((KNOTS[:, None] - KNOTS) / SHAPE_LENGTH) ** 2)
     away = KNOTS - ORDINARY[0]
     often = np.exp(-0.5 * (away / ORDINARY[1]) ** 2)
-    return SHAPE_STD**2 * pinned(pinned(smooth, often), away * often)
+    return pinned(pinned(_SMOOTH, often), away * often)
 
 
-_COVARIANCE: Final = _covariance()
+_SMOOTH: Final = SHAPE_STD**2 * np.exp(-0.5 * ((KNOTS[:, None] - KNOTS) / SHAPE_LENGTH) ** 2)
+_UNCALIBRATED: Final = _uncalibrated()

@@ -71,6 +71,8 @@ class MassTrack:
     segments : mass between stops
     sensitivity : (k,) how far one unit of each parameter of the calibration moves the mass
         [kg per unit]; None where a method does not say
+    shape_sensitivity : (k,) how far an error of the torque at each of the knots of
+        `weighbridge.estimators.torque_shape` moves it [kg]; None where a method does not say
     slow_errors : what was estimated beside the mass; None where a method does not
     filter_input : what the filter of the joint estimator was given; None of other methods
     possible_change : of the load that was not found and may have been; None of other methods
@@ -95,6 +97,7 @@ class MassTrack:
     segments: tuple[Segment, ...]
     systematic_std: float = math.nan
     sensitivity: Floats | None = None
+    shape_sensitivity: Floats | None = None
     slow_errors: SlowErrors | None = None
     filter_input: FilterInput | None = None
     possible_change: PossibleChange | None = None

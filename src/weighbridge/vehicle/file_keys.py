@@ -335,6 +335,18 @@ SECTIONS: Final[dict[str, tuple[type[Any], tuple[Key, ...]]]] = {
                 "part of any mass weighed with this file, as standard deviation",
             ),
             Key(
+                "std_factor",
+                "std_factor",
+                "scatter of parts of the drives over what the filter says of it",
+            ),
+            Key("highest_torque", "highest_torque", "of the drives", suffix="nm"),
+            Key(
+                "torque_use",
+                "torque_use",
+                "how far an error of that size, at 18 parts of it, moved their masses",
+                "numbers",
+            ),
+            Key(
                 "dbc", "dbc", "DBC files they were read with, seen from this file's folder", "texts"
             ),
             Key("notes", "notes", "free text", "text"),

@@ -9,7 +9,7 @@ from weighbridge.arguments import check_choice
 from weighbridge.errors import ConfigError
 from weighbridge.messages import Problem
 from weighbridge.vehicle.fits import FITS, Fit
-from weighbridge.vehicle.possible import MASSES, not_negative, within
+from weighbridge.vehicle.possible import MASSES, not_negative, positive, within
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -31,6 +31,12 @@ class Provenance:
         [rad]; None where it is not known
     mass_scale_std : relative standard deviation that the calibration leaves in
         every mass weighed with it [-]
+    std_factor : scatter of parts of the calibration's drives over what the filter says of it [-];
+        None where it is not known
+    highest_torque : of the drives [N m]; None where it is not known
+    torque_use : how far an error of the torque of one ``highest_torque``, at each of the knots of
+        `weighbridge.estimators.torque_shape`, moved their masses, relative [-]; empty where it is
+        not known
     fit_cov : covariance of what was fitted, once the scale of every mass is known: lower
         triangle, row by row, of torque coefficients, curvature, slopes at the knots, drag area,
         rolling coefficient, engine and wheel inertia; empty where it is not known
@@ -50,6 +56,9 @@ class Provenance:
     motion: str | None = None
     unmeasured_grade: float | None = None
     mass_scale_std: float | None = None
+    std_factor: float | None = None
+    highest_torque: float | None = None
+    torque_use: tuple[float, ...] = ()
     fit_cov: tuple[float, ...] = ()
     dbc: tuple[str, ...] = ()
     notes: str | None = None
@@ -60,6 +69,9 @@ class Provenance:
         within("unmeasured_grade", self.unmeasured_grade, 0.0, 1.0, "rad")
         not_negative("mass_scale_std", self.mass_scale_std)
         within("mass_scale_std", self.mass_scale_std, 0.0, 1e3)
+        positive("std_factor", self.std_factor)
+        within("std_factor", self.std_factor, 0.1, 100.0)
+        positive("highest_torque", self.highest_torque)
         for mass in self.masses:
             within("one of masses", mass, *MASSES, "kg")
         size = math.isqrt(2 * len(self.fit_cov))

@@ -10,7 +10,6 @@ import numpy as np
 from weighbridge.estimators.joint.load_stops import change_odds
 from weighbridge.estimators.joint.possible import averaged
 from weighbridge.estimators.joint.problem import (
-    UNMODELLED,
     FilterInput,
     JointSizes,
     first_state,
@@ -73,7 +72,8 @@ class JointState(NamedTuple):
 
     def std(self, sizes: JointSizes) -> float:
         """Standard deviation of the running mass [kg]."""
-        return float(np.hypot(UNMODELLED * np.sqrt(self.var), self.mass * sizes.systematic_std))
+        own = sizes.std_factor * np.sqrt(self.var)
+        return float(np.hypot(own, self.mass * sizes.systematic_std))
 
 
 def resumed(given: FilterInput, setup: JointSetup, until: float) -> JointState:
@@ -92,7 +92,7 @@ def resumed(given: FilterInput, setup: JointSetup, until: float) -> JointState:
         return JointState()
 
     part = given.first(seen)
-    end, same, _ = averaged(part, setup.std, setup.settings)
+    end, same, _ = averaged(part, setup.std, setup.settings, setup.std_factor)
     total = part.weight()
     jumps = np.flatnonzero(part.added.any(axis=1))
     before = part.first(int(jumps[-1])).weight() if jumps.size else 0.0

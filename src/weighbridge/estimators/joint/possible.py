@@ -9,7 +9,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from weighbridge.estimators.joint.problem import UNMODELLED, FilterInput, load_params
+from weighbridge.estimators.joint.problem import FilterInput, load_params
 from weighbridge.estimators.joint.settings import JointSettings
 from weighbridge.kernels import disturbance
 from weighbridge.messages import Problem, phrase
@@ -91,7 +91,7 @@ class Averaged(NamedTuple):
     possible: PossibleChange | None
 
 
-def averaged(given: FilterInput, std: Floats, settings: JointSettings) -> Averaged:
+def averaged(given: FilterInput, std: Floats, settings: JointSettings, factor: float) -> Averaged:
     """Return the state after the last window over all hypotheses of a change of load more or less.
 
     Without a change found at a stop, each row after it says how probable one is: the states
@@ -105,6 +105,8 @@ def averaged(given: FilterInput, std: Floats, settings: JointSettings) -> Averag
     given : of the estimator
     std : (k,) of the states before the drive has shown
     settings
+    factor : errors of the mass over what the filter says of them, by which the covariance will be
+        widened [-]
 
     References
     ----------
@@ -140,7 +142,7 @@ def averaged(given: FilterInput, std: Floats, settings: JointSettings) -> Averag
     mean = share @ x
     off = x - mean
     # The spread of the hypotheses is known; what is unmodelled is of each of them.
-    spread = np.einsum("k,ki,kj->ij", share, off, off) / UNMODELLED**2
+    spread = np.einsum("k,ki,kj->ij", share, off, off) / factor**2
     cov = np.einsum("k,kij->ij", share, np.array([s.cov for s in states])) + spread
     more, less = share[1 : 1 + stops.size], share[1 + stops.size :]
     likeliest = states[1 + int(np.argmax(more))] if stops.size else same

@@ -15,8 +15,9 @@ from weighbridge.kernels import disturbance, load_change
 from weighbridge.signals import Bools, Floats
 
 UNMODELLED: Final = 1.6
-"""Errors of the mass over what the filter says of them [-]: simulated drives of one
-calibration scatter so around their mean, after five minutes as after an hour."""
+"""Errors of the mass over what the filter says of them, where no calibration has shown it [-]:
+simulated drives of one calibration scatter so around their mean, after five minutes as after an
+hour."""
 
 _TRIED: Final = np.array([[0.0, 0.0], [0.2, 0.0], [0.0, -1.0]])
 """Logarithms of the levels that the search for the likeliest starts from [-]."""
@@ -197,6 +198,7 @@ class JointSizes:
     noise_information : trace of the windows' information times the noise of the motion in them,
         which times the variance of the mass is the part that it is too low by [1/kg^2]
     systematic_std : relative standard deviation of the mass that no row takes away [-]
+    std_factor : errors of the mass over what the filter says of them [-]
     switched_power : of accessories that go on and off; 0 without [W]
     settings : of the estimator
     """
@@ -208,6 +210,7 @@ class JointSizes:
     motion_var: float
     noise_information: float
     systematic_std: float
+    std_factor: float
     switched_power: float
     settings: JointSettings
 
