@@ -1,6 +1,7 @@
 """The open benchmark: made, weighed and scored by its commands."""
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -28,6 +29,19 @@ def bench(tmp_path_factory):
     settings = BenchmarkSettings(drives=1, minutes=6.0, only=("truck", "imu-50hz", "one", "sheet"))
     assert make.make_benchmark(folder, settings) == 2
     return folder
+
+
+def test_the_command_of_its_page_scores(weighbridge, bench, monkeypatch):
+    (bench / "RESULTS.csv").write_text(
+        f"drive,mass_kg\n{TRUCK}/drive-1,9000\n{BY_SHEET}/drive-1,\n"
+    )
+    page = (bench / "README.md").read_text()
+    (command,) = re.findall(r"`weighbridge (benchmark score [^`]*)`", page)
+    monkeypatch.chdir(bench)
+    ran = weighbridge(*command.split())
+    (bench / "RESULTS.csv").unlink()
+    assert ran.code == 0
+    assert ran.out.splitlines()[1].split()[:2] == ["all", "2"]
 
 
 @pytest.fixture

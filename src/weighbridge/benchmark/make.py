@@ -25,6 +25,7 @@ from weighbridge.errors import ConfigError
 from weighbridge.io.quiet import PARSE_ERRORS, first_line
 from weighbridge.io.write import write_drive, write_frame
 from weighbridge.signals import Drive, DriveInfo
+from weighbridge.signals.shown import plural
 from weighbridge.simulation.simulate import SimulatedDrive, simulate_car
 from weighbridge.vehicle.file import save_vehicle
 from weighbridge.vehicle.known import Described, Known, describe
@@ -236,7 +237,8 @@ def _readme(settings: BenchmarkSettings, count: int) -> str:
 
     return f"""# Drives of unknown mass
 
-{count} drives to weigh, made by the simulator of weighbridge {VERSION} with seed {settings.seed}.
+{plural(count, "drive")} to weigh, made by the simulator of weighbridge {VERSION} with seed
+{settings.seed}.
 `drives.csv` lists them with their slices. Each vehicle has a folder with its data sheet
 (`vehicle.toml`), its drives of known mass (`calibration-*`, mass in `drive.toml`) and its drives
 to weigh (`drive-*`). A program may use all of that, and nothing of `truth.csv`.
@@ -248,7 +250,7 @@ position, height, speed and course.
 
 The result is a CSV file: `drive,mass_kg,std_kg`, one row a drive, and if known `low_kg,high_kg`
 of the 95 % interval. The mass is that of all that rolls, at the end of the drive. An empty mass is
-a refusal. `weighbridge benchmark score RESULTS.csv --benchmark .` prints the score.
+a refusal. `weighbridge benchmark score RESULTS.csv --truth truth.csv` prints the score.
 
 Equipment:
 
@@ -256,7 +258,7 @@ Equipment:
 
 Calibration:
 
-{listed(CALIBRATIONS, lambda n: f"{n} drives of known mass")}
+{listed(CALIBRATIONS, lambda n: f"{plural(n, 'drive')} of known mass")}
 
 Classes: {", ".join(CLASSES)}. Roads: {", ".join(ROUTES)}.
 
