@@ -32,6 +32,7 @@ SHARED: Final = ROOT.parent / "shared"
 SOURCES: Final = (
     *sorted((ROOT / "src/weighbridge/simulation").glob("*.py")),
     *sorted((ROOT / "src/weighbridge/signals").glob("*.py")),
+    *sorted((ROOT / "src/weighbridge/vehicle").glob("*.py")),
     *sorted((ROOT / "studies/second_model").glob("*.py")),
     ROOT / "studies/accuracy_drives.py",
     ROOT / "studies/fault_subjects.py",

@@ -72,11 +72,11 @@ def test_a_calibrated_file_promises_no_more_than_it_leaves():
         return expected("speed_grade", fast=True, vehicle=made)
 
     assert promised(None) == expected("speed_grade", fast=True)
-    # 2.5 % of the motion beside it, of 1.6 % and of 6 %.
+    # 1.2 % of the motion beside it, of 1.6 % and of 6 %.
     ends = np.array([promised(0.016), promised(0.06)])
-    assert ends[1] / ends[0] == pytest.approx(np.hypot(6.0, 2.5) / np.hypot(1.6, 2.5), rel=0.03)
+    assert ends[1] / ends[0] == pytest.approx(np.hypot(6.0, 1.2) / np.hypot(1.6, 1.2), rel=0.03)
     low, high = ends[0]
-    assert low < np.hypot(1.6, 2.5) < high
+    assert low < np.hypot(1.6, 1.2) < high
 
 
 def cosine(duration, rise):

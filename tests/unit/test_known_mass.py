@@ -74,8 +74,8 @@ def test_a_mass_of_a_truck_leads_to_its_class():
     check_mass(DRIVE, 10_203.0, Vehicle(kind="truck"))
 
 
-def test_a_mass_in_pounds_is_doubted_by_fuel_and_drag_and_at_each_weighing():
-    """An engine load has no scale of its own: air drag and the fuel burnt are what checks it."""
+def test_a_mass_in_pounds_is_doubted_by_fuel_and_at_each_weighing():
+    """An engine load has no scale of its own: the fuel burnt checks it."""
     made = make_scenario("compact-calibration", seed=63)
     known = simulate_car(replace(made, duration=1000.0, sensors=Sensors(imu_rate=50.0)))
     mass = float(known.truth.mass[0])
@@ -83,7 +83,7 @@ def test_a_mass_in_pounds_is_doubted_by_fuel_and_drag_and_at_each_weighing():
     assert wb.calibrate([bare], mass=mass).provenance.doubts == ()
     heavy = wb.calibrate([bare], mass=mass / POUND)
     said = {p.id for p in heavy.provenance.problems}
-    assert {"calibration.fuel", "calibration.drag"} <= said
+    assert "calibration.fuel" in said
     assert set(heavy.provenance.problems) <= set(wb.weigh(bare, heavy).problems)
 
 
