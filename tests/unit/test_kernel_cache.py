@@ -52,7 +52,7 @@ def install(folder):
     def run(factor):
         (kernels / "called.py").write_text(CALLED.format(factor=factor))
         ran = subprocess.run(
-            [sys.executable, "-c", CALL, folder], capture_output=True, text=True, check=True
+            [sys.executable, "-B", "-c", CALL, folder], capture_output=True, text=True, check=True
         )
         value, hits = ran.stdout.split()
         return float(value), int(hits)
