@@ -84,14 +84,13 @@ def estimate(
     running = np.full(rows.time.size, np.nan)
     with np.errstate(divide="ignore", invalid="ignore"):
         running[index] = np.cumsum(power) / np.cumsum(cross)
-    held = np.maximum.accumulate(np.where(np.isfinite(running), np.arange(running.size), 0))
     return finish(
         METHOD,
         balance,
         vehicle,
         rows,
         settings,
-        running=running[held],
+        running=running,
         running_std=np.full(running.size, mass_of(slice(0, running.size), BLOCK)[1]),
         mass_of=mass_of,
     )

@@ -101,7 +101,8 @@ def finish(
     ----------
     method : name of the estimator
     balance, vehicle, rows, settings
-    running, running_std : (n,) mass as the rows until then have it, and its standard deviation [kg]
+    running, running_std : (n,) mass as the rows until then have it, and its standard deviation
+        [kg]; NaN where a row adds nothing: the mass before it stays
     mass_of : mass of some rows and its standard deviation [kg], and the blocks of a length [s]
         behind them
     """
@@ -112,6 +113,9 @@ def finish(
     if not (np.isfinite(mass) and mass > 0.0):
         return nothing(method, balance, vehicle, rows.reason, blocks, settings)
     slow = consider_std(balance, phi, used, vehicle)
+    running = running[
+        np.maximum.accumulate(np.where(np.isfinite(running), np.arange(used.size), 0))
+    ]
     fitted = Fitted(
         mass=mass,
         scatter=scatter,

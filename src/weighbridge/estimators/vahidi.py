@@ -108,15 +108,13 @@ def estimate(
         std = MEDIAN_STD * float(np.std(medians, ddof=1)) / n**0.5 if n > 2 else float("inf")
         return float(np.median(masses)), std, int(n)
 
-    held = np.maximum.accumulate(np.where(np.isfinite(estimates), np.arange(estimates.size), 0))
-    running = estimates[held]
     return finish(
         METHOD,
         balance,
         vehicle,
         rows,
         settings,
-        running=running,
-        running_std=np.full(running.size, np.nanstd(estimates)),
+        running=estimates,
+        running_std=np.full(estimates.size, np.nanstd(estimates)),
         mass_of=mass_of,
     )

@@ -191,10 +191,10 @@ class Bucket(Folder):
             self._list(now)
 
     def _list(self, files: dict[str, list[Any]]) -> None:
-        told = {"sending": secrets.token_hex(8), "files": files}
-        self._put(SENT, json.dumps(told).encode())
-        self._there = told
-        write_whole(self._home / SENT, json.dumps(told))
+        listing = {"sending": secrets.token_hex(8), "files": files}
+        self._put(SENT, json.dumps(listing).encode())
+        self._there = listing
+        write_whole(self._home / SENT, json.dumps(listing))
 
     def _put(self, name: str, data: bytes) -> None:
         self._files.pipe_file(f"{self._root}/{name}", data)
