@@ -70,11 +70,13 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     longest_first(items)
 
 
+@pytest.hookimpl(trylast=True)
 def pytest_runtest_teardown(item: pytest.Item, nextitem: pytest.Item | None) -> None:
     """Give memory back after each file: drives that its functions keep, and what glibc holds."""
     if nextitem is None or nextitem.path != item.path:
+        own = (item.module.__name__, "tests", "studies")
         for kept in vars(item.module).values():
-            if hasattr(kept, "cache_clear") and kept.__module__.startswith(("tests", "studies")):
+            if hasattr(kept, "cache_clear") and kept.__module__.startswith(own):
                 kept.cache_clear()
         # Another C library may know no such call.
         with contextlib.suppress(AttributeError):
