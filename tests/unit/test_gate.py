@@ -113,11 +113,11 @@ def test_a_good_drive_passes(method):
 
 @pytest.mark.parametrize("method", METHODS)
 def test_specific_force_that_hardly_varies_carries_no_mass(method):
-    cruise = balance(swing=0.14, minutes=30.0)
+    cruise = balance(swing=0.09, minutes=30.0)
     track = weighed(method, cruise, **ANY_WIDTH)
     assert track.status is Status.NOT_EXCITED
     assert track.reason.id == "motion.not_excited"
-    assert f"{track.reason.values['least']:.3f}" == "0.120"
+    assert f"{track.reason.values['least']:.3f}" == "0.080"
     assert weighed(method, cruise, **ANY_WIDTH, least_spread=0).status is Status.CONVERGED
 
 
@@ -127,11 +127,11 @@ def test_a_short_stretch_carries_no_mass(method, monkeypatch):
     short = balance(minutes=1.4 if method == "rls" else 0.9)
     monkeypatch.setattr(judging.Evidence, "half_width", 0.0)
     wide = ANY_WIDTH | {"fewest_blocks": 0}
-    track = weighed(method, short, **wide)
+    track = weighed(method, short, **wide, least_time=60)
     assert track.status is Status.NOT_EXCITED
     assert track.reason.id == "motion.short"
-    assert f"{track.reason.values['least']:.0f}" == "60"
-    assert weighed(method, short, **wide, least_time=0).status is Status.CONVERGED
+    assert 20 < track.reason.values["used"] < 60
+    assert weighed(method, short, **wide).status is Status.CONVERGED
 
 
 @pytest.mark.parametrize("method", METHODS)
