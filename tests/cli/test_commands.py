@@ -93,7 +93,7 @@ def test_calibrate_refuses_to_overwrite(weighbridge, car, known):
         (["--mass", "1580", "--mass", "1600"], "2 masses for 1 drives"),
         (["--mass", "1580,1600"], "repeat --mass, as --mass 1580 --mass 1600"),
         (["--mass", "1580,5"], "give a number of kg"),
-        (["--torque", "measured"], "no engine_torque"),
+        (["--torque", "measured"], "engine_torque"),
         (["--torque", "guess"], "--torque must be "),
         (["--vehicle", "nowhere.toml"], "nowhere.toml"),
     ],

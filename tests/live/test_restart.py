@@ -8,6 +8,7 @@ import pytest
 
 import weighbridge as wb
 from tests.live.senders import HOST, Senders
+from tests.noted import says
 from weighbridge.live.records import Records
 from weighbridge.live.weighing import LiveStatus
 from weighbridge.signals.recent import LONGEST_STEP
@@ -177,10 +178,10 @@ def test_a_drive_with_no_inertial_sensor_says_what_it_costs(car, loaded):
         told = scale.weighing()
         reasons.append(told.reason)
         looks.append((told.driven, told.look))
-        notes.append([n for n in told.notes if n.startswith("no inertial sensor comes")])
+        notes.append([n for n in told.problems if n.id == "live.no_inertial"])
     assert not notes[0]
     assert len(notes[-1]) == 1
-    again = {r for r in reasons if "checked again after" in r}
+    again = {r for r in reasons if r and says(r, "looked_at_after")}
     assert len(again) > 3
     # The bar of the next look moves with the driving, and begins anew at a look.
     steps = [(b[0] - a[0], b[1] - a[1]) for a, b in pairwise(looks)]

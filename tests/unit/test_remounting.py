@@ -105,8 +105,8 @@ def test_calibration_sees_the_reported_wind(made):
 @pytest.mark.parametrize(
     ("begin", "told"),
     [
-        (0.0, (r"at 205 s", r"from 300 to 600 s")),
-        (1.79e9, (r"at \d\d:\d\d:\d\d", r"from \d\d:\d\d:\d\d to \d\d:\d\d:\d\d")),
+        (0.0, (r"205 s", r"300 \w+ 600 s")),
+        (1.79e9, (r" \d\d:\d\d:\d\d", r" \d\d:\d\d:\d\d \w+ \d\d:\d\d:\d\d")),
     ],
 )
 def test_a_note_tells_the_instant_by_the_drives_clock(begin, told):

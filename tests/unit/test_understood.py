@@ -48,7 +48,8 @@ def test_a_text_of_which_most_is_not_understood_is_refused(tmp_path, name):
     (tmp_path / name).write_text(f"{head}{chr(10).join(lines)}\n")
     with refused("file.not_understood") as found:
         read(tmp_path / name, None, None)
-    assert "6 of 10 lines" in str(found.value)
+    values = found.value.problem.values
+    assert (values["count"], values["lines"].split()[0]) == (6, "10")
 
 
 @pytest.mark.parametrize(
