@@ -104,7 +104,7 @@ def test_less_driving_promises_less(motion):
         assert ends == sorted(ends)
         assert len(set(ends)) == 3
     assert [chance(motion, d) for d in (drives[0], drives[-1])] == ["sure", "none"]
-    assert chance(motion, excitation(cosine(300.0, 8.0))) == "unsure"
+    assert chance(motion, excitation(cosine(100.0, 8.0))) == "unsure"
 
 
 @pytest.mark.parametrize("fast", [True, False])

@@ -70,8 +70,9 @@ _UNSURE: Final = 2.5
 _HOPELESS: Final = 100.0 * GATE.widest_of_drive
 """The same from which none comes [%]: the gate of every method."""
 
-_SHORT: Final = 400.0
-"""Time of driving below which a mass may not come [s]: of it some rows are used."""
+_SHORT: Final = 150.0
+"""Time of driving below which a mass may not come [s]. With an inertial sensor, 24 of 121 cuts of
+70 to 160 s carry none, and 7 of 261 longer ones."""
 
 _SLOW: Final = 2.0
 """Speed below which a vehicle counts as standing [m/s]."""
