@@ -139,6 +139,11 @@ def cold_share(time: Floats, phi: Floats, used: Bools, start: float | None = Non
     return float(np.sum(power[moving < begin + WARMING]) / np.sum(power))
 
 
+LITTLE: Final = 60.0
+"""Time of used rows below which a wide interval is due to it [s]: two time constants of the
+disturbance."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Evidence:
     """What an estimator has made of a drive, for `judge`.
@@ -248,7 +253,7 @@ def _narrow_enough(found: Evidence, vehicle: Vehicle) -> tuple[Status, Problem |
     if mass + half_width < low or mass - half_width > high:
         return _possible(found, vehicle)
     cause = found.slow_speed or phrase("more_starts")
-    if not found.slow_speed and found.used_time < found.gate.least_time:
+    if not found.slow_speed and found.used_time < LITTLE:
         cause = phrase("drive_longer", used=found.used_time)
     elif not found.slow_speed and found.systematic_std > found.drive_std:
         cause = phrase("left_open", share=100.0 * found.systematic_std / abs(mass))
