@@ -85,7 +85,7 @@ def _not_another(found: Any, *given: Any) -> Any:
     return False, None
 
 
-def _not_steadied(found: Any, drive: Any, *given: Any) -> Any:
+def _not_smoothed(found: Any, drive: Any, *given: Any) -> Any:
     return drive, (), None
 
 
@@ -114,7 +114,7 @@ def _passed(found: Any, *given: Any) -> Any:
 NAMED: Final[tuple[tuple[Callable[..., Any], dict[str, str]], ...]] = (
     (_nothing, {
         "checks.clocks": "check_rates check_overlap check_pauses",
-        "checks.witnesses": "check_reading check_witnesses witnessed",
+        "checks.second_signals": "check_reading check_witnesses witnessed",
         "checks.steps": "check_steps",
         "checks.inertial": "_check_parts _check_gravity _check_rate _check_axes",
         "checks.speed": "_check_alone _check_positions _check_altitude",
@@ -133,7 +133,7 @@ NAMED: Final[tuple[tuple[Callable[..., Any], dict[str, str]], ...]] = (
         "balance.filled": "identify_fill",
         "balance.floor": "find_floor",
         "balance.disagreement": "_change",
-        "balance.witness": "follow",
+        "balance.second_signal": "follow",
         "estimators.joint.changing": "largest in_place_of_loads",
         "estimators.joint.bend": "bent",
         "estimators.joint.contradicted": "contradicted",
@@ -158,12 +158,12 @@ NAMED: Final[tuple[tuple[Callable[..., Any], dict[str, str]], ...]] = (
         "checks.spikes": "without_spikes",
         "checks.ranges": "without_strays within_ranges",
         "checks.smoothed_imu": "without_smoothed",
-        "checks.mending": "mended _without_frozen _without_false _without_ends",
-        "checks.witnesses": "_thawed",
+        "checks.correcting": "corrected _without_frozen _without_false _without_ends",
+        "checks.second_signals": "_without_frozen",
         "checks.inertial": "_without_spikes",
-        "navigation.clock_drift": "mend_clocks _narrowed",
+        "navigation.clock_drift": "correct_clocks _narrowed",
         "navigation.along": "with_forward_accel",
-        "navigation.frozen": "thawed",
+        "navigation.frozen": "without_frozen",
         "vehicle.as_read": "as_read",
         "estimators.squat": "of_vehicle",
     }),
@@ -181,13 +181,13 @@ NAMED: Final[tuple[tuple[Callable[..., Any], dict[str, str]], ...]] = (
         "estimators.judging": "cold_share uncalibrated_std grade_apart",
         "navigation.identify.alignment": "gnss_delay",
         "navigation.longitudinal": "_lateness",
-        "calibration.doubted_motion": "gain_std",
+        "calibration.uncertain_motion": "gain_std",
         "vehicle.power_balance": "_lateness",
     }),
     (_false, {
         "checks.false_samples": "isolated piled clipped",
         "checks.frozen": "frozen",
-        "checks.witnesses": "_outvoted",
+        "checks.second_signals": "_outvoted",
         "checks.steps": "_cleared",
         "navigation.dropouts": "false_rows rare_spikes repeated_rows _spikes _zeros _clipped",
         "navigation.identify.gain": "_upheld _smoothed _rougher",
@@ -201,8 +201,8 @@ NAMED: Final[tuple[tuple[Callable[..., Any], dict[str, str]], ...]] = (
         "estimators.judging": "lacks_accelerometer",
     }),
     (_empty, {
-        "calibration.doubted_masses": "doubted_masses contradicting unbacked_scale",
-        "calibration.doubted_motion": "doubted_gains",
+        "calibration.questionable_masses": "questionable_masses contradicting unbacked_scale",
+        "calibration.uncertain_motion": "uncertain_gains",
         "calibration.run": "_mass_doubts _balance_notes",
         "navigation.identify.remounting": "find_changes",
     }),
@@ -216,7 +216,7 @@ NAMED: Final[tuple[tuple[Callable[..., Any], dict[str, str]], ...]] = (
     (_vehicle_first, {"vehicle.power_balance": "by_power"}),
     (_vehicle_kept, {"balance.circumference": "on_its_tyres"}),
     (_not_another, {"estimators.joint.foreign": "of_another"}),
-    (_not_steadied, {"balance.torque_drift": "steadied"}),
+    (_not_smoothed, {"balance.torque_drift": "smoothed_steps"}),
 )  # fmt: skip
 """Functions by module, with the answer of each that found nothing."""
 

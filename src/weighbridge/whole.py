@@ -66,7 +66,7 @@ def whole_file(path: str | Path, error: type[WeighbridgeError] = ConfigError) ->
         Of the type given: it cannot be written. The old file is as it was.
     """
     path = Path(path)
-    with _told(path, error):
+    with _reported(path, error):
         if is_stream(path):
             with tempfile.TemporaryDirectory() as home:
                 part = Path(home) / f"part{path.suffix}"
@@ -113,7 +113,7 @@ def whole_folder(
         Of the type given: it cannot be written. The old files are as they were.
     """
     folder = Path(folder)
-    with _told(folder, error):
+    with _reported(folder, error):
         target = _followed(folder)
         if target.exists() and not target.is_dir():
             raise NotADirectoryError(errno.ENOTDIR, "is a file; name a folder")
@@ -168,7 +168,7 @@ def refuse_unwritable_place(path: str | Path, error: type[WeighbridgeError] = Co
         Of the type given: the disk or the folder is read-only.
     """
     path = Path(path)
-    with _told(path, error):
+    with _reported(path, error):
         target = _followed(path)
         if target.is_dir():
             target /= "file"
@@ -212,7 +212,7 @@ def _swapped(part: Path, target: Path, replaced: Collection[str]) -> Path:
 
 
 @contextlib.contextmanager
-def _told(path: Path, error: type[WeighbridgeError]) -> Iterator[None]:
+def _reported(path: Path, error: type[WeighbridgeError]) -> Iterator[None]:
     try:
         yield
     except BrokenPipeError:

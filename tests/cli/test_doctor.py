@@ -61,7 +61,7 @@ def test_requirements_are_those_of_the_project():
     ],
 )
 def test_a_package_that_does_not_fit_is_told(package, words):
-    assert package.told == words
+    assert package.reported == words
     assert package.fits == (not words)
 
 

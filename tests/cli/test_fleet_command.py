@@ -118,7 +118,7 @@ def test_a_scheduler_without_a_worker_is_told(weighbridge, fleet, tmp_path, monk
     assert "6 recordings weighed" in ran.out
     opened = Results.opened(results)
     with opened.locked():
-        opened.tell(opened.told() | {"workers": 0, "done": 0})
+        opened.write_progress(opened.read_progress() | {"workers": 0, "done": 0})
         assert "no worker is connected" in weighbridge("fleet", "status", results).out
 
 

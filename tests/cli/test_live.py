@@ -132,7 +132,7 @@ def test_a_ticket_calibrates(weighbridge, loaded, brief, car, tmp_path):
 def test_a_ticket_of_a_long_drive_makes_a_file(known, car):
     made = calibrated_by_ticket(wb.read_drive(known.folder), known.mass, wb.Vehicle.load(car))
     assert made.vehicle is not None
-    assert made.told.startswith("it leaves ± ")
+    assert made.reported.startswith("it leaves ± ")
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="there are no named pipes")

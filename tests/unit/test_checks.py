@@ -12,7 +12,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 from tests.noted import refused
 
-from weighbridge.checks import check_drive, mend_drive
+from weighbridge.checks import check_drive, correct_drive
 from weighbridge.checks.clocks import check_pauses
 from weighbridge.checks.inertial import check_imu
 from weighbridge.errors import DriveError
@@ -659,7 +659,7 @@ def test_clock_that_jumps_a_day(sane):
     s = sane.signals["vehicle_speed"]
     time = s.time.copy()
     time[-10:] += 1e9
-    settled = mend_drive(Drive("d", {s.name: replace(s, time=time)}))
+    settled = correct_drive(Drive("d", {s.name: replace(s, time=time)}))
     assert not any(p.serious for p in settled.problems)
     assert settled.duration < 1000.0
     assert settled.problems[0].id == "clock.jump_cut"

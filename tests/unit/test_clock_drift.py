@@ -9,9 +9,9 @@ from tests.noted import refused
 
 import weighbridge as wb
 from weighbridge.balance.instants import lagged_motion
-from weighbridge.checks import mend_drive
+from weighbridge.checks import correct_drive
 from weighbridge.messages import phrase
-from weighbridge.navigation.clock_drift import mend_clocks
+from weighbridge.navigation.clock_drift import correct_clocks
 from weighbridge.navigation.clock_lag import Integrated, find_lags
 from weighbridge.navigation.select import find_motion
 from weighbridge.signals import QUANTITIES
@@ -69,7 +69,7 @@ def counted(period, share, seed=1):
 
 
 def test_sound_clocks_are_left_to_the_last_bit(made):
-    mended = mend_clocks(made.drive)
+    mended = correct_clocks(made.drive)
     assert mended.problems == made.drive.problems
     for name, s in made.drive.signals.items():
         assert mended.signals[name].time is s.time
@@ -113,7 +113,7 @@ def test_clocks_that_part_are_brought_together(made, car, mass, tables, change):
 
 
 def test_an_inertial_clock_of_its_own_is_the_one_that_is_moved(made):
-    mended = mend_clocks(retimed(made.drive, {"imu"}, lambda t: t * (1.0 + 1e-3)))
+    mended = correct_clocks(retimed(made.drive, {"imu"}, lambda t: t * (1.0 + 1e-3)))
     assert mended.signals["vehicle_speed"].time is made.drive.signals["vehicle_speed"].time
     found = mended.problems[-1]
     assert (found.id, found.values["table"]) == ("clock.moved", "obd and gnss")
@@ -132,7 +132,7 @@ def test_a_clock_that_jumps_about_is_refused(made, car):
 
 def test_rows_about_a_step_are_left_out(made):
     drive = retimed(made.drive, {"obd"}, lambda t: t + 2.0 * (t > 700.0))
-    settled = mend_drive(drive)
+    settled = correct_drive(drive)
     assert any(
         p.id == "clock.moved" and p.values["what"].startswith(phrase("clock_jumps", several="+2.0"))
         for p in settled.problems
@@ -143,7 +143,7 @@ def test_rows_about_a_step_are_left_out(made):
 
 
 def test_clocks_seconds_apart_are_no_swapped_axes(made):
-    settled = mend_drive(retimed(made.drive, {"obd", "gnss"}, lambda t: t + 40.0))
+    settled = correct_drive(retimed(made.drive, {"obd", "gnss"}, lambda t: t + 40.0))
     assert not any(p.serious for p in settled.problems)
     assert any(p.id == "clock.moved" and "+39.9" in p.values["what"] for p in settled.problems)
     assert_array_equal(
@@ -215,7 +215,7 @@ def test_wheels_that_turn_while_the_vehicle_stands_leave_the_inertial_sensor(mad
     noise = np.random.default_rng(93).normal(0.0, 0.02, len(bench.signals["accel_x"]))
     shaken = [bench.signals[f"accel_{a}"] for a in "xyz"]
     bench = bench.with_signals(*(replace(s, values=s.values + noise) for s in shaken))
-    settled = mend_clocks(bench)
+    settled = correct_clocks(bench)
     assert any(p.id == "clock.no_lag_obd" for p in settled.problems)
     assert len(settled.signals["accel_x"]) == len(made.drive.signals["accel_x"])
 
@@ -241,7 +241,7 @@ def test_a_bus_that_is_recorded_in_turns_has_a_sound_clock(made, car, mass, on, 
 
 def test_a_step_of_a_clock_that_is_recorded_in_turns_is_found(made):
     late = retimed(in_turns(made.drive, 10.0, 20.0), {"obd"}, lambda t: t + 2.0 * (t > 700.0))
-    settled = mend_drive(late)
+    settled = correct_drive(late)
     assert any(
         p.id == "clock.moved" and p.values["what"].startswith(phrase("clock_jumps", several="+"))
         for p in settled.problems

@@ -8,7 +8,7 @@ import pytest
 from numpy.testing import assert_array_equal
 from tests.unit.test_checks import CAR, GNSS, make_drive, shifted
 
-from weighbridge.checks import check_drive, mend_drive
+from weighbridge.checks import check_drive, correct_drive
 from weighbridge.io import read_drive, write_drive
 from weighbridge.pipeline.inspection import inspect_drive
 from weighbridge.signals import Drive, Signal
@@ -45,7 +45,7 @@ def test_a_stray_stamp_is_left_out_without_asking_for_memory(sane, names, stamp)
     names = names or tuple(sane.signals)
     k = -1 if stamp > 0.0 else 0
     tracemalloc.start()
-    settled = mend_drive(stamped(sane, names, k, stamp), CAR)
+    settled = correct_drive(stamped(sane, names, k, stamp), CAR)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert peak < 1e8
@@ -57,7 +57,7 @@ def test_a_stray_stamp_is_left_out_without_asking_for_memory(sane, names, stamp)
 
 
 def test_a_stray_stamp_in_mid_table_needs_no_rising_clock(sane):
-    settled = mend_drive(stamped(sane, IMU, 700, 1e12), CAR)
+    settled = correct_drive(stamped(sane, IMU, 700, 1e12), CAR)
     assert not any(p.serious for p in settled.problems)
     assert len(settled.signals["accel_x"]) == len(sane.signals["accel_x"]) - 1
 
@@ -74,7 +74,7 @@ def test_a_clock_that_starts_in_1970_leaves_the_longer_part(sane, names):
             if names or s.name != "vehicle_speed"
         )
     )
-    settled = mend_drive(faulty, CAR)
+    settled = correct_drive(faulty, CAR)
     assert not any(p.serious for p in settled.problems)
     assert "clock.jump_cut" in ids(settled.problems)
     assert settled.duration < 1000.0
@@ -83,7 +83,7 @@ def test_a_clock_that_starts_in_1970_leaves_the_longer_part(sane, names):
 
 @pytest.mark.parametrize("at", [200.0, 700.0])
 def test_a_clock_set_in_motion_is_joined(sane, at):
-    settled = mend_drive(shifted(sane, sane.signals, at, 1.7e9), CAR)
+    settled = correct_drive(shifted(sane, sane.signals, at, 1.7e9), CAR)
     assert not any(p.serious for p in settled.problems)
     assert "clock.jump_joined" in ids(settled.problems)
     for name, s in sane.signals.items():
@@ -97,7 +97,7 @@ def test_parts_of_two_recordings_are_not_joined(sane):
     v = sane.signals["vehicle_speed"]
     stops = np.interp(v.time, [0.0, 380.0, 400.0, 420.0, 900.0], [1.0, 1.0, 0.0, 1.0, 1.0])
     drive = sane.with_signals(replace(v, values=v.values * stops))
-    settled = mend_drive(shifted(drive, drive.signals, 400.0, 1e6), CAR)
+    settled = correct_drive(shifted(drive, drive.signals, 400.0, 1e6), CAR)
     (found,) = [p for p in settled.problems if p.id == "clock.jump_cut"]
     assert (found.values["side"], found.values["length"]) == (
         "after",
@@ -110,7 +110,7 @@ def test_many_hours_without_samples_are_cut_before_they_cost_memory():
     time = np.concatenate([np.arange(0.0, 600.0, 0.1), 600.0 + 18_000.0 * np.arange(1, 200)])
     rng = np.random.default_rng(3)
     s = Signal("vehicle_speed", time, 10.0 + rng.normal(0.0, 0.1, time.size))
-    settled = mend_drive(Drive("d", {s.name: s}))
+    settled = correct_drive(Drive("d", {s.name: s}))
     assert settled.duration == pytest.approx(600.0, abs=1.0)
 
 
@@ -139,7 +139,7 @@ def test_a_stray_stamp_in_a_file_leaves_the_rest(tmp_path, sane, row, stamp):
     lines[row] = f"{stamp:g}," + lines[row].split(",", 1)[1]
     lines[300] = "-7e13," + lines[300].split(",", 1)[1]
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    settled = mend_drive(read_drive(tmp_path), CAR)
+    settled = correct_drive(read_drive(tmp_path), CAR)
     assert not any(p.serious for p in settled.problems)
     assert len(settled.signals["vehicle_speed"]) == len(sane.signals["vehicle_speed"]) - 2
 
@@ -179,7 +179,7 @@ def test_cells_no_vehicle_has_are_left_out(sane, name, value):
     s = sane.signals[name]
     values = s.values.copy()
     values[[100, 333]] = value
-    settled = mend_drive(sane.with_signals(replace(s, values=values)), CAR)
+    settled = correct_drive(sane.with_signals(replace(s, values=values)), CAR)
     assert_array_equal(settled.signals[name].values, np.delete(s.values, [100, 333]))
     (problem,) = settled.problems
     assert problem.values["count"] == 2
@@ -201,7 +201,7 @@ def test_a_drive_made_of_broken_signals_is_mended(sane):
     time, values = s.time.copy(), s.values.copy()
     time[[50, 51]] = time[[51, 50]]
     values[70] = np.nan
-    settled = mend_drive(sane.with_signals(replace(s, time=time, values=values)), CAR)
+    settled = correct_drive(sane.with_signals(replace(s, time=time, values=values)), CAR)
     found = settled.signals["vehicle_speed"]
     assert np.isfinite(found.values).all()
     assert (np.diff(found.time) > 0.0).all()
@@ -211,7 +211,7 @@ def test_a_drive_made_of_broken_signals_is_mended(sane):
 def test_a_drive_made_with_whole_seconds_is_spread(sane):
     """Stamps that repeat are no rate without end."""
     floored = [replace(sane.signals[n], time=np.floor(sane.signals[n].time)) for n in OBD]
-    settled = mend_drive(sane.with_signals(*floored), CAR)
+    settled = correct_drive(sane.with_signals(*floored), CAR)
     assert not any(p.serious for p in settled.problems)
     found = settled.signals["vehicle_speed"]
     assert len(found) == len(sane.signals["vehicle_speed"])

@@ -12,7 +12,7 @@ from tests.noted import has, says
 import weighbridge as wb
 from weighbridge.checks.smoothed_imu import check_smoothed
 from weighbridge.navigation import clock_lag
-from weighbridge.navigation.clock_drift import mend_clocks
+from weighbridge.navigation.clock_drift import correct_clocks
 from weighbridge.navigation.clock_lag import Integrated
 from weighbridge.navigation.identify import gain
 from weighbridge.signals import QUANTITIES, Drive, Signal
@@ -77,7 +77,7 @@ def one_after_another(routes):
 
 
 def test_sound_clocks_of_a_day_are_left_to_the_last_bit(day):
-    mended = mend_clocks(day)
+    mended = correct_clocks(day)
     assert mended.problems == day.problems
     assert all(mended.signals[name].time is s.time for name, s in day.signals.items())
 
@@ -85,7 +85,7 @@ def test_sound_clocks_of_a_day_are_left_to_the_last_bit(day):
 @pytest.mark.parametrize("ppm", [50.0, -50.0])
 def test_a_sensor_that_drifts_by_seconds_in_a_day_is_brought_back(day, ppm):
     """50 ppm are 1.4 s in eight hours, and no more than 0.02 s from one piece to the next."""
-    mended = mend_clocks(retimed(day, "imu", lambda t: t * (1.0 + 1e-6 * ppm)))
+    mended = correct_clocks(retimed(day, "imu", lambda t: t * (1.0 + 1e-6 * ppm)))
     told = mended.problems[-1]
     assert has([told], "clock.moved", table="obd and gnss", other="imu")
     assert says(told.text, "clock_drifts", slope=-ppm)
@@ -105,12 +105,12 @@ def test_a_coarse_speed_on_a_motorway_is_no_clock_that_jumps():
     made = Scenario(name="motorway", car=MIDSIZE, route=highway_route(9453, length=30e3), seed=9453)
     drive = simulate_car(replace(made, duration=1800.0, sensors=Sensors(imu_rate=20.0))).drive
     coarse = in_steps(drive, 5.0 / 3.6)
-    assert mend_clocks(coarse).problems == coarse.problems
+    assert correct_clocks(coarse).problems == coarse.problems
 
 
 def test_a_step_of_the_clock_of_a_coarse_speed_is_found(short):
     late = retimed(in_steps(short, 5.0 / 3.6), "obd", lambda t: t + 2.0 * (t > 1500.0))
-    told = mend_clocks(late).problems[-1]
+    told = correct_clocks(late).problems[-1]
     assert has([told], "clock.moved", table="obd", most=pytest.approx(2.0, abs=0.2))
     assert says(told.text, "clock_jumps")
 

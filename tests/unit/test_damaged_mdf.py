@@ -16,7 +16,7 @@ from tests.noted import has
 
 from weighbridge.errors import DriveError, WeighbridgeError
 from weighbridge.io import read_drive
-from weighbridge.io.mdf_mend import guard, mended
+from weighbridge.io.mdf_repair import corrected, guard
 from weighbridge.messages import phrase
 
 ANSWERS = 200
@@ -125,7 +125,7 @@ LAYOUTS = ("sorted", "lists", "unsorted", "unfinished")
 def test_whole_files_are_left_alone(tmp_path, layout):
     path = tmp_path / "log.mf4"
     path.write_bytes(log(layout))
-    assert mended(path) is None
+    assert corrected(path) is None
     drive = read_drive(path)
     assert drive.problems == ()
     assert_allclose(drive.signals["vehicle_speed"].time, TIMES, atol=1e-9)
@@ -211,7 +211,7 @@ def group_3(raw):
 
 @pytest.mark.parametrize("compression", [0, 1, 2])
 def test_whole_files_of_asammdf_pass(tmp_path, compression):
-    assert mended(written(tmp_path, compression=compression)) is None
+    assert corrected(written(tmp_path, compression=compression)) is None
 
 
 def test_mdf_3(tmp_path):
@@ -265,7 +265,7 @@ def test_links_in_a_circle(tmp_path, kind, link):
 def test_channels_beyond_their_record(tmp_path, form, at, value):
     rows = np.zeros(COUNT, [("vehicle_speed_mps", "<f8", (2, 3))])
     path = written(tmp_path, values=rows)
-    assert mended(path) is None
+    assert corrected(path) is None
     raw = bytearray(path.read_bytes())
     struct.pack_into(form, raw, at(raw), *(value if isinstance(value, tuple) else (value,)))
     path.write_bytes(raw)

@@ -65,4 +65,4 @@ def test_a_name_tells_that_it_was_calculated(tmp_path, name):
     pl.DataFrame(table).write_csv(tmp_path / "t.csv")
     found = draft(tmp_path / "t.csv")
     assert NAME not in {c.quantity for c in found.known}
-    assert any("calculated" in doubt for doubt in found.all_doubts)
+    assert any("calculated" in doubt for doubt in found.all_questions)

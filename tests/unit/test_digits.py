@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from weighbridge.checks import mend_drive
+from weighbridge.checks import correct_drive
 from weighbridge.checks.digits import with_half_digits
 from weighbridge.signals import Signal
 from weighbridge.simulation import make_scenario, simulate_car
@@ -75,14 +75,14 @@ def test_digits_that_are_cut_off_get_half_a_step(drive, step):
     ],
 )
 def test_digits_that_nothing_mends_are_refused(drive, step, how, id):
-    found = mend_drive(to_digits(drive, ACCEL, step, how)).problems[0]
+    found = correct_drive(to_digits(drive, ACCEL, step, how)).problems[0]
     assert found.serious
     assert found.id == id
 
 
 @pytest.mark.parametrize("how", [np.trunc, np.round])
 def test_a_gyro_with_few_digits_has_no_wrong_sign(drive, how):
-    settled = mend_drive(to_digits(drive, GYRO, 0.02, how))
+    settled = correct_drive(to_digits(drive, GYRO, 0.02, how))
     assert not any(p.serious for p in settled.problems)
 
 
@@ -90,7 +90,7 @@ def test_a_mirrored_gyro_with_all_digits_is_still_refused():
     made = simulate_car(replace(make_scenario("car", seed=88), duration=900.0)).drive
     nod = made.signals["gyro_y"]
     mirrored = made.with_signals(Signal(nod.name, nod.time, -nod.values))
-    assert any(p.id == "imu.gyro_sign" for p in mend_drive(mirrored).problems if p.serious)
+    assert any(p.id == "imu.gyro_sign" for p in correct_drive(mirrored).problems if p.serious)
 
 
 def test_an_inertial_sensor_averaged_to_a_second_is_slow_and_not_in_milliseconds(drive):
@@ -101,8 +101,8 @@ def test_an_inertial_sensor_averaged_to_a_second_is_slow_and_not_in_milliseconds
         count = len(s) // each * each
         mean = s.values[:count].reshape(-1, each).mean(axis=1)
         slow = slow.with_signals(Signal(name, s.time[:count:each], mean))
-    (problem,) = [p for p in mend_drive(slow).problems if p.serious]
+    (problem,) = [p for p in correct_drive(slow).problems if p.serious]
     assert problem.id == "clock.slow_sensor"
     late = [slow.signals[n] for n in ACCEL + GYRO]
     late = slow.with_signals(*(Signal(s.name, s.time * 1e3, s.values) for s in late))
-    assert mend_drive(late).problems[0].id == "clock.milliseconds"
+    assert correct_drive(late).problems[0].id == "clock.milliseconds"

@@ -6,8 +6,13 @@ from types import SimpleNamespace
 import numpy as np
 from tests.noted import refused
 
-from weighbridge.calibration import doubted_masses as module
-from weighbridge.calibration.doubted_masses import contradicting, tared, unbacked_scale, with_doubts
+from weighbridge.calibration import questionable_masses as module
+from weighbridge.calibration.questionable_masses import (
+    contradicting,
+    tared,
+    unbacked_scale,
+    with_findings,
+)
 from weighbridge.messages import Problem, phrase
 from weighbridge.vehicle.model import TorqueModel, Vehicle
 
@@ -53,13 +58,13 @@ def test_burnt_fuel_is_not_on_board_any_more(monkeypatch):
         "estimate",
         lambda *_, **__: SimpleNamespace(mass=next(weighed), bound_std=5.0),
     )
-    monkeypatch.setattr(module, "doubted_gains", lambda *_: [])
+    monkeypatch.setattr(module, "uncertain_gains", lambda *_: [])
     vehicle = SimpleNamespace(
         provenance=SimpleNamespace(drives=NAMES, fit=SimpleNamespace(refined=True)), gross=None
     )
     found = []
     monkeypatch.setattr(module, "contradicting", lambda *given: found.append(given) or [])
-    assert module.doubted_masses(vehicle, balances, MASSES) == []
+    assert module.questionable_masses(vehicle, balances, MASSES) == []
     np.testing.assert_allclose(found[0][2], 1.0)
 
 
@@ -82,5 +87,5 @@ def test_tare_and_gross_are_asked_for_where_only_the_mass_tells_the_scale():
 def test_doubts_survive_the_vehicle_file(tmp_path):
     path = tmp_path / "car.toml"
     doubt = Problem.of("calibration.above_gross", drive="a", mass=1600.0, gross=1500.0)
-    with_doubts(Vehicle(), [doubt]).save(path)
+    with_findings(Vehicle(), [doubt]).save(path)
     assert Vehicle.load(path).provenance.problems == (doubt,)

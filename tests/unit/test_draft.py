@@ -100,8 +100,8 @@ def test_what_was_drafted_reads_the_log(make, tmp_path):
 
 
 def test_units_that_the_log_states_are_not_doubted_and_others_are(tmp_path):
-    assert draft(car_scanner(tmp_path)).all_doubts == ()
-    doubts = " ".join(draft(no_units(tmp_path)).all_doubts)
+    assert draft(car_scanner(tmp_path)).all_questions == ()
+    doubts = " ".join(draft(no_units(tmp_path)).all_questions)
     assert "'VEHICLE_SPEED': states no unit; its highest is" in doubts
     assert "taken as ratio" in doubts
 
@@ -124,7 +124,7 @@ def test_gravity_tells_the_unit_of_an_accelerometer(tmp_path):
     units = [{c.unit for c in draft(phone(tmp_path, g, "a.csv")).known} for g in (9.81, 1.0)]
     assert units == [{"mps2"}, {"g"}]
     gone = draft(phone(tmp_path, 1e-3, "b.csv", " (m/s^2)"))
-    assert "gravity was taken out of it" in " ".join(gone.all_doubts)
+    assert "gravity was taken out of it" in " ".join(gone.all_questions)
 
 
 def test_several_files_of_a_drive_get_a_table_each(tmp_path):
@@ -161,13 +161,13 @@ def test_a_unit_that_is_not_known_is_told_and_the_column_left_out(tmp_path):
     head = "Time (s),MAF air flow rate (lb/day),Vehicle speed (km/h),Wheel speed FL (km/h)"
     found = draft(written(tmp_path / "maf.csv", [head, *rows]))
     assert [c.quantity for c in found.known] == ["vehicle_speed"]
-    assert "its unit 'lb/day' is not known" in " ".join(found.all_doubts)
+    assert "its unit 'lb/day' is not known" in " ".join(found.all_questions)
 
 
 def test_empty_columns_and_text_are_told(tmp_path):
     rows = [f"{t:.2f},,about 2100,50" for t in T]
     head = "Time (s),Engine Torque (Nm),Engine RPM,Vehicle speed (km/h)"
-    doubts = " ".join(draft(written(tmp_path / "x.csv", [head, *rows])).all_doubts)
+    doubts = " ".join(draft(written(tmp_path / "x.csv", [head, *rows])).all_questions)
     assert "not taken for engine_torque: it has no values" in doubts
     assert "not taken for engine_speed: its cells are no numbers" in doubts
 
@@ -238,7 +238,7 @@ def test_a_clock_of_any_name_is_the_time(tmp_path, name):
     found = draft(path)
     assert (found.time, found.time_format, found.row_rate) == (name, "clock", None)
     assert found.duration == pytest.approx(89 * 60.0)
-    assert any("rises as one" in d for d in found.doubts) == (name == "Uur")
+    assert any("rises as one" in d for d in found.questions) == (name == "Uur")
 
 
 @pytest.mark.parametrize("stamps", [[7] * 40, [50 - k for k in range(40)]])
@@ -258,7 +258,7 @@ def test_a_time_of_another_name_is_found(tmp_path, name):
     found = draft(path)
     assert (found.time, found.time_unit) == (name, "ms")
     assert found.known[0].rate == pytest.approx(5.0)
-    assert any("rises as one" in d for d in found.doubts)
+    assert any("rises as one" in d for d in found.questions)
 
 
 @pytest.mark.parametrize(("sign", "doubted"), [(-1.0, False), (1.0, True)])
@@ -272,7 +272,7 @@ def test_the_torque_of_a_retarder_is_taken_and_its_sign_doubted(tmp_path, sign, 
     pl.DataFrame(columns).write_parquet(path)
     found = {c.quantity: c for c in draft(path).known}["retarder_torque"]
     assert found.unit == "pct"
-    assert ("factor = -1" in found.doubt) == doubted
+    assert ("factor = -1" in found.question) == doubted
 
 
 @pytest.mark.parametrize(
@@ -312,7 +312,7 @@ def test_rows_that_are_counted_are_a_clock_once_their_rate_is_known(tmp_path):
     found = draft(path)
     assert found.time == "Sample"
     assert found.rate_unknown
-    assert "does not tell how many there are per second" in found.doubts[0]
+    assert "does not tell how many there are per second" in found.questions[0]
     mapping = tmp_path / "map.toml"
     mapping.write_text(mapping_text([found]), encoding="utf-8")
     with pytest.raises(ConfigError, match="rate_hz is not known yet: write how many rows"):
@@ -339,7 +339,7 @@ def test_a_table_without_any_time_has_the_number_of_its_rows(tmp_path):
     path = written(tmp_path / "x.csv", ["Vehicle Speed (km/h),Engine RPM", *rows])
     found = draft(path)
     assert (found.time, found.rate_unknown, found.rows) == ("", True, ROWS)
-    assert "no column can be its time" in found.doubts[0]
+    assert "no column can be its time" in found.questions[0]
     signals = {"vehicle_speed": {"column": "Vehicle Speed (km/h)"}}
     drive = read_drive(path, {"time": {"rate_hz": 4.0}, "signals": signals})
     assert drive.signals["vehicle_speed"].duration == pytest.approx(T[-1])
@@ -390,12 +390,12 @@ def test_the_speed_of_a_table_with_positions_is_doubted_where_its_name_does_not_
     for name, doubts in (("Speed", True), ("GPS Speed", False), ("OBD Speed", False)):
         head = f"Time (s),{name} (km/h),Latitude (deg),Longitude (deg),Engine RPM"
         found = draft(written(tmp_path / "x.csv", [head, *rows]))
-        assert any("does not tell which" in d for d in found.all_doubts) == doubts
+        assert any("does not tell which" in d for d in found.all_questions) == doubts
     head = "Time (s),Speed (km/h),Latitude (deg),Longitude (deg),comment"
     # Of a table that has nothing else of the vehicle it is the satellites'.
     found = draft(written(tmp_path / "x.csv", [head, *rows]))
     assert "gnss_speed" in {c.quantity for c in found.known}
-    assert not found.all_doubts
+    assert not found.all_questions
 
 
 def hp_tuners(folder):
@@ -533,7 +533,7 @@ def test_a_counter_of_minutes_alone_is_told(tmp_path, name):
     """By its name, or by the speed that no vehicle changes so fast."""
     found = draft(driven(tmp_path, {name: (MINUTES // 60 + 7).astype(int)}))
     assert (found.time, found.time_unit) == (name, "min")
-    assert any("minutes" in doubt for doubt in found.doubts)
+    assert any("minutes" in doubt for doubt in found.questions)
 
 
 @pytest.mark.parametrize("unit", ["s", "min"])

@@ -70,4 +70,4 @@ def test_a_torque_without_unit_is_a_percent_beside_its_reference(
         columns["trq_ref"] = np.full(TIME.size, reference)
     known = {c.name: c for c in draft(day(tmp_path / "a.parquet", **columns)).known}
     assert (known["trq_act"].quantity, known["trq_act"].unit) == (quantity, unit)
-    assert "states no unit" in known["trq_act"].doubt
+    assert "states no unit" in known["trq_act"].question

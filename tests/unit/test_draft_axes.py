@@ -23,7 +23,7 @@ def gyro(path, size, names=("gyroX", "gyroY", "gyroZ")):
 def test_a_gyroscope_has_one_unit_by_its_largest_axis(tmp_path, size, unit):
     found = gyro(tmp_path / "phone.csv", size)
     assert [(c.quantity, c.unit) for c in found.known] == [(f"gyro_{a}", unit) for a in "xyz"]
-    assert len(found.all_doubts) == 3
+    assert len(found.all_questions) == 3
 
 
 def test_a_stated_unit_is_that_of_the_other_axes(tmp_path):
@@ -57,6 +57,6 @@ def test_a_clock_that_begins_anew_is_told_as_it_is_read(tmp_path):
     log = tmp_path / "two.csv"
     pl.DataFrame({"Time (s)": time, "Vehicle speed (km/h)": wheel}).write_csv(log)
     found = draft(log)
-    assert any("the clock begins anew" in d and "2 recordings" in d for d in found.doubts)
+    assert any("the clock begins anew" in d and "2 recordings" in d for d in found.questions)
     (tmp_path / "map.toml").write_text(mapping_text([found]), encoding="utf-8")
     assert len(read_drives(log, tmp_path / "map.toml")) == 2

@@ -35,7 +35,7 @@ def table(folder, names, name="log.csv", units=()):
 def test_a_unit_that_does_not_fit_is_named(tmp_path, name, quantity, unit):
     found = draft(table(tmp_path, ["time_s", name, "Load (%)"]))
     assert {c.quantity for c in found.known} == {"engine_load"}
-    doubt = next(d for d in found.all_doubts if name in d)
+    doubt = next(d for d in found.all_questions if name in d)
     assert f"not taken for {quantity}: its unit {unit!r}" in doubt
     assert "it can be in" in doubt
 
@@ -43,7 +43,7 @@ def test_a_unit_that_does_not_fit_is_named(tmp_path, name, quantity, unit):
 def test_the_unit_of_a_row_of_units_is_named(tmp_path):
     names, units = ["time", "Engine speed", "Engine load", "Speed"], ["s", "beats", "%", "km/h"]
     found = draft(table(tmp_path, names, units=units))
-    assert "'Engine speed': not taken for engine_speed: its unit 'beats'" in found.all_doubts[0]
+    assert "'Engine speed': not taken for engine_speed: its unit 'beats'" in found.all_questions[0]
 
 
 @pytest.mark.parametrize(
@@ -96,7 +96,7 @@ def test_cells_that_are_no_numbers_are_shown(tmp_path):
     rows = [f"{k},v{50 + k % 2},{k}" for k in range(ROWS)]
     path = tmp_path / "log.csv"
     path.write_text("\n".join(["Time (s),Speed (km/h),Load (%)", *rows]))
-    (doubt,) = (d for d in draft(path).all_doubts if "Speed" in d)
+    (doubt,) = (d for d in draft(path).all_questions if "Speed" in d)
     assert "its cells are no numbers, such as 'v50'" in doubt
 
 

@@ -19,7 +19,7 @@ def doubt(tmp_path, name, values, ground="GPS speed (m/s)", shown=SPEED):
     pl.DataFrame({"t_s": TIME, ground: shown, "latitude": 48.0 + 1e-5 * TIME}).write_csv(gnss)
     drafts = with_compared_speeds([draft(obd), draft(gnss)])
     (speed,) = (c for one in drafts for c in one.columns if c.quantity == "vehicle_speed")
-    return speed.doubt
+    return speed.question
 
 
 @pytest.mark.parametrize(

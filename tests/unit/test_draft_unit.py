@@ -51,7 +51,7 @@ def test_whole_numbers_of_another_unit_show_the_unit(tmp_path, unit, whole):
 def test_whole_numbers_of_its_own_show_nothing(tmp_path):
     shown = np.round(3.6 * SPEED)
     pl.DataFrame({"time_s": TIME, "Vehicle speed": shown}).write_csv(tmp_path / "t.csv")
-    assert "its highest is" in draft(tmp_path / "t.csv").columns[0].doubt
+    assert "its highest is" in draft(tmp_path / "t.csv").columns[0].question
 
 
 def test_fleet_telemetry_with_positions_is_in_mph(tmp_path):

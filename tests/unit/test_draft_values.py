@@ -32,7 +32,7 @@ def test_the_battery_of_the_lights_drives_nothing(tmp_path):
     found, whole = drafted(tmp_path, {"Battery Voltage (V)": volts, "Battery Current (A)": amps})
     assert found["module_voltage"] == "Battery Voltage (V)"
     assert not {"battery_voltage", "battery_current"} & set(found)
-    assert any("Battery Current" in doubt for doubt in whole.all_doubts)
+    assert any("Battery Current" in doubt for doubt in whole.all_questions)
     found, _ = drafted(tmp_path, {"Battery Voltage (V)": 28 * volts, "Battery Current (A)": amps})
     assert {"battery_voltage", "battery_current"} <= set(found)
 
@@ -64,7 +64,7 @@ def test_what_only_its_unit_tells_is_found_by_how_it_moves(tmp_path):
     assert found["engine_speed"] == "zz2 [rpm]"
     assert found["mass_air_flow"] == "zz3 [g/s]"
     # What was found without a name is asked about.
-    assert all(c.unsure and c.doubt for c in whole.known if c.name.startswith("zz"))
+    assert all(c.unsure and c.question for c in whole.known if c.name.startswith("zz"))
 
 
 def test_two_that_fit_and_differ_are_none(tmp_path):

@@ -15,11 +15,11 @@ from weighbridge.balance.bandwidth import smoothed_torque
 from weighbridge.balance.delay import estimate_torque_delay
 from weighbridge.balance.force_balance import force_balance
 from weighbridge.balance.gear_fit import share_on_gears
-from weighbridge.balance.torque_drift import steadied
+from weighbridge.balance.torque_drift import smoothed_steps
 from weighbridge.checks import check_drive
+from weighbridge.checks.correcting import corrected
 from weighbridge.checks.false_samples import clipped, isolated, piled
 from weighbridge.checks.frozen import frozen
-from weighbridge.checks.mending import mended
 from weighbridge.estimators import Status, joint
 from weighbridge.estimators.joint import changing
 from weighbridge.estimators.joint.bend import BENT
@@ -110,7 +110,7 @@ def right(fleet, kind, weighing):
 @pytest.mark.parametrize("kind", SOURCE)
 def test_an_undamaged_drive_is_left_as_it_is(fleet, kind):
     drive = fleet.drive(kind)
-    kept = mended(drive, fleet.files[kind])
+    kept = corrected(drive, fleet.files[kind])
     assert kept.problems == ()
     assert all(kept.signals[n].values is s.values for n, s in drive.signals.items())
     right(fleet, kind, fleet.weighed(kind))
@@ -423,7 +423,7 @@ def test_a_reading_with_shifts_and_full_load_is_no_fault():
 def test_what_a_person_vouches_for_stays(fleet):
     damaged = with_signal(fleet.drive("electric"), "engine_torque", frozen_from(600.0))
     trusted = replace(damaged, info=replace(damaged.info, trusted=("engine_torque",)))
-    kept = mended(trusted, fleet.files["electric"])
+    kept = corrected(trusted, fleet.files["electric"])
     assert len(kept.signals["engine_torque"]) == len(damaged.signals["engine_torque"])
 
 
@@ -528,9 +528,9 @@ def test_a_sign_that_was_never_seen_is_not_missed():
         dragged=dragged,
     )
     drive = Drive("x", {torque.name: torque})
-    assert len(mended(drive, vehicle).signals[torque.name]) == time.size
+    assert len(corrected(drive, vehicle).signals[torque.name]) == time.size
     negative = replace(dragged, level=(-0.09,))
-    left = mended(drive, replace(vehicle, dragged=negative)).signals[torque.name]
+    left = corrected(drive, replace(vehicle, dragged=negative)).signals[torque.name]
     assert left.values.min() > 0.09
 
 
@@ -570,7 +570,7 @@ def test_torque_that_keeps_its_lag_is_left_alone(fleet, kind):
     drive = fleet.drive(kind)
     motion = find_motion(drive, fleet.files[kind])
 
-    kept, notes, _ = steadied(drive, fleet.files[kind], motion, 0.0)
+    kept, notes, _ = smoothed_steps(drive, fleet.files[kind], motion, 0.0)
 
     assert kept is drive
     assert notes == ()
@@ -579,7 +579,7 @@ def test_torque_that_keeps_its_lag_is_left_alone(fleet, kind):
 def test_a_balance_worked_out_before_finds_the_same_delay(fleet):
     drive, car = fleet.drive("truck"), fleet.files["truck"]
     motion = find_motion(drive, car)
-    _, _, begun = steadied(drive, car, motion, 0.0)
+    _, _, begun = smoothed_steps(drive, car, motion, 0.0)
     elsewhere = force_balance(drive, car, motion, delay=0.3)
 
     delay = estimate_torque_delay(drive, car, motion)

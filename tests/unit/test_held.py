@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from weighbridge.checks import mend_drive
+from weighbridge.checks import correct_drive
 from weighbridge.signals import Drive, Signal
 from weighbridge.signals.held import renewed, without_repeats
 
@@ -72,7 +72,7 @@ def test_a_torque_that_is_renewed_slowly_is_reported(short_drive):
     fast = Signal(
         "engine_load", time, load.at(load.time[0] + np.floor((time - time[0]) / 0.9) * 0.9)
     )
-    drive = mend_drive(short_drive.drive.with_signals(fast))
+    drive = correct_drive(short_drive.drive.with_signals(fast))
     (found,) = (p for p in drive.problems if p.id == "range.repeats")
     assert found.signal == "engine_load"
     assert found.values["renewed"] == pytest.approx(0.9, abs=0.02)

@@ -7,10 +7,10 @@ import pytest
 from weighbridge.errors import ConfigError
 from weighbridge.vehicle.classes import VEHICLE_CLASSES
 from weighbridge.vehicle.data_sheet import RADIUS_STD
+from weighbridge.vehicle.description import can_weigh, tell
 from weighbridge.vehicle.file import save_vehicle
 from weighbridge.vehicle.known import Known, describe
 from weighbridge.vehicle.model import Vehicle
-from weighbridge.vehicle.telling import can_weigh, tell
 from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
 from weighbridge.vehicle.tyre import rolling_radius
 

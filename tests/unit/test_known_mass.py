@@ -6,7 +6,7 @@ import pytest
 from tests.noted import refused
 
 import weighbridge as wb
-from weighbridge.calibration.known_mass import POUND, check_mass, drag_doubt, scale_doubt
+from weighbridge.calibration.known_mass import POUND, check_mass, drag_finding, scale_finding
 from weighbridge.errors import ConfigError
 from weighbridge.signals import Drive
 from weighbridge.signals.drive import DriveInfo
@@ -52,7 +52,7 @@ def test_a_trailer_is_stated_as_gross():
 @pytest.mark.parametrize(("slope", "told"), [(0.93, False), (1.12, True), (0.76, True)])
 def test_the_torque_of_a_calibration_tells_of_its_mass(slope, told):
     vehicle = Vehicle(kind="van", torque=TorqueModel(source="measured", coefficients=(0.0, slope)))
-    found = scale_doubt(vehicle, [2100.0], "drive")
+    found = scale_finding(vehicle, [2100.0], "drive")
     assert (found is not None) is told
     assert found is None or found.id == "calibration.scale"
 
@@ -60,10 +60,10 @@ def test_the_torque_of_a_calibration_tells_of_its_mass(slope, told):
 def test_a_torque_twice_too_strong_is_pounds():
     vehicle = Vehicle(kind="van", torque=TorqueModel(source="percent", coefficients=(0.0, 2.05)))
     with refused("calibration.scale_wrong") as found:
-        scale_doubt(vehicle, [4630.0], "drive")
+        scale_finding(vehicle, [4630.0], "drive")
     assert "2100 kg" in found.value.problem.values["hint"]
     load = replace(vehicle, torque=TorqueModel(source="load", coefficients=(0.0, 205.0)))
-    assert scale_doubt(load, [4630.0], "drive") is None
+    assert scale_finding(load, [4630.0], "drive") is None
 
 
 def test_a_mass_of_a_truck_leads_to_its_class():
@@ -102,7 +102,7 @@ def test_a_drag_area_that_no_car_has_is_told(area, source, word):
         road_load=RoadLoad(drag_area=area),
         torque=TorqueModel(source=source, coefficients=(0.0, 1.0)),
     )
-    told = drag_doubt(car, [2568.0])
+    told = drag_finding(car, [2568.0])
     assert (told.values["word"] if told is not None else None) == word
 
 

@@ -7,7 +7,7 @@ import pytest
 from tests.noted import refused
 
 import weighbridge as wb
-from weighbridge.checks import check_drive, mend_drive
+from weighbridge.checks import check_drive, correct_drive
 from weighbridge.messages import phrase
 from weighbridge.signals import QUANTITIES
 from weighbridge.simulation import MIDSIZE, Scenario, Sensors, jensen_route, simulate_car
@@ -65,7 +65,7 @@ def test_packets_stamped_as_they_arrive_are_refused_by_their_cause(made, car):
 
 def test_a_sensor_recorded_in_turns_comes_in_no_packets(made):
     turns = with_inertial(made.drive, lambda t: np.where(t % 40.0 < 3.0, t, np.nan))
-    assert not any(p.id == "clock.packets" for p in mend_drive(turns).problems)
+    assert not any(p.id == "clock.packets" for p in correct_drive(turns).problems)
 
 
 def test_a_torque_polled_every_four_seconds_is_told_so(made, car):

@@ -8,7 +8,7 @@ from numba import config
 from scipy.signal import lfilter
 
 from weighbridge.balance.shaking import shaken
-from weighbridge.checks import mend_drive
+from weighbridge.checks import correct_drive
 from weighbridge.navigation.select import find_motion
 from weighbridge.signals import Signal
 from weighbridge.simulation import Sensors, make_scenario, simulate_car
@@ -26,7 +26,7 @@ def drive(request):
 
 
 def told(drive):
-    drive = mend_drive(drive)
+    drive = correct_drive(drive)
     return shaken(drive, find_motion(drive))
 
 

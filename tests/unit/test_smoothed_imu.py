@@ -7,7 +7,7 @@ import pytest
 from numba import config
 
 import weighbridge as wb
-from weighbridge.checks import mend_drive
+from weighbridge.checks import correct_drive
 from weighbridge.checks.smoothed_imu import check_smoothed
 from weighbridge.signals import Signal
 from weighbridge.signals.catalogue import IMU_SIGNALS
@@ -59,7 +59,7 @@ def test_a_sensor_of_few_samples_cannot_tell(drive):
 
 
 def test_with_heights_a_smoothed_sensor_is_left_out_and_the_rest_weighs(drive):
-    found = mend_drive(smoothed(drive, 3.0))
+    found = correct_drive(smoothed(drive, 3.0))
     assert not any(p.serious for p in found.problems)
     assert not set(found.signals) & set(IMU_SIGNALS)
     assert {"vehicle_speed", "altitude"} <= set(found.signals)
@@ -67,10 +67,10 @@ def test_with_heights_a_smoothed_sensor_is_left_out_and_the_rest_weighs(drive):
 
 
 def test_without_heights_or_where_a_person_vouches_nothing_is_left_out(drive):
-    flat = mend_drive(smoothed(drive.without("altitude"), 3.0))
+    flat = correct_drive(smoothed(drive.without("altitude"), 3.0))
     assert any(p.serious and p.id == "imu.smoothed" for p in flat.problems)
     vouched = replace(drive, info=replace(drive.info, trusted=IMU_SIGNALS))
-    kept = mend_drive(smoothed(vouched, 3.0))
+    kept = correct_drive(smoothed(vouched, 3.0))
     assert set(IMU_SIGNALS) <= set(kept.signals)
 
 

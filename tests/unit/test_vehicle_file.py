@@ -20,11 +20,11 @@ from weighbridge.vehicle.model import (
     Mounting,
     Provenance,
     RoadLoad,
+    SecondSignalRelation,
     SpeedModel,
     Timing,
     TorqueModel,
     Vehicle,
-    WitnessRelation,
 )
 from weighbridge.vehicle.rounding import covariance_texts
 from weighbridge.visible import visible
@@ -97,7 +97,7 @@ witnesses = st.sets(st.sampled_from(sorted(WITNESS_TERMS)), max_size=3).flatmap(
     lambda names: st.tuples(
         *(
             st.builds(
-                WitnessRelation,
+                SecondSignalRelation,
                 signal=st.just(name),
                 coefficients=st.tuples(*[finite] * many),
                 **witness_fields,
@@ -198,7 +198,7 @@ def test_numbers_are_rounded_to_their_uncertainty(tmp_path):
             roll=math.radians(1.23456789), std=(math.radians(0.02),) * 3, squat=math.radians(0.2)
         ),
         witnesses=(
-            WitnessRelation(
+            SecondSignalRelation(
                 signal="mass_air_flow",
                 coefficients=(1.0 / 3.0, 0.0, 2.0, 1e-9 / 3.0),
                 scatter=0.01,

@@ -11,13 +11,13 @@ from tests.noted import refused
 
 import weighbridge as wb
 from weighbridge.balance.disagreement import accepted_scales, findings
-from weighbridge.balance.witness import BY_SIGNAL, compare, rows_of
-from weighbridge.balance.witness_learning import learn_witnesses
-from weighbridge.checks.witnesses import check_reading, check_witnesses
+from weighbridge.balance.second_signal import BY_SIGNAL, compare, rows_of
+from weighbridge.balance.second_signal_learning import learn_second_signals
+from weighbridge.checks.second_signals import check_reading, check_second_signals
 from weighbridge.estimators import ESTIMATORS
 from weighbridge.messages import phrase
 from weighbridge.signals import Drive, DriveInfo, Signal
-from weighbridge.vehicle.model import Driveline, TorqueModel, Vehicle, WitnessRelation
+from weighbridge.vehicle.model import Driveline, SecondSignalRelation, TorqueModel, Vehicle
 
 END = 1500.0
 MIDDLE = 0.5 * END
@@ -95,13 +95,13 @@ def learnt(*signals):
 
 
 def with_witnesses(signals, known, vehicle):
-    found, doubts = learn_witnesses(known, vehicle)
+    found, doubts = learn_second_signals(known, vehicle)
     assert not doubts
     return replace(vehicle, witnesses=tuple(w for w in found if w.signal in signals))
 
 
 def test_the_relation_gives_the_reading_back():
-    found, doubts = learn_witnesses(known_drives(), CAR)
+    found, doubts = learn_second_signals(known_drives(), CAR)
     assert [w.signal for w in found] == ["mass_air_flow", "intake_pressure", "fuel_rate"]
     assert not doubts
     for relation in found:
@@ -125,12 +125,12 @@ def test_a_comparison_equals_least_squares_without_outliers():
 
 def test_what_does_not_explain_the_reading_is_no_witness():
     diesels = [drive(seed, diesel=True) for seed in (1, 2, 3)]
-    assert learn_witnesses(diesels, CAR) == ((), ())
+    assert learn_second_signals(diesels, CAR) == ((), ())
 
 
 def test_a_source_is_no_witness_of_itself():
     air = replace(CAR, torque=TorqueModel(source="air_flow"))
-    found, _ = learn_witnesses(known_drives(), air)
+    found, _ = learn_second_signals(known_drives(), air)
     assert "mass_air_flow" not in [w.signal for w in found]
     assert "engine_load" in [w.signal for w in found]
 
@@ -142,7 +142,7 @@ def test_other_drives_agree():
             "agrees",
             "agrees",
         ]
-        assert check_witnesses(made, learnt("mass_air_flow", "intake_pressure")) == ()
+        assert check_second_signals(made, learnt("mass_air_flow", "intake_pressure")) == ()
 
 
 FAULTS = {
@@ -160,7 +160,9 @@ FAULTS = {
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_reading_that_left_its_only_witness_gives_no_mass(fault):
     change, expected = FAULTS[fault]
-    (problem,) = check_witnesses(changed(drive(20), "engine_load", change), learnt("mass_air_flow"))
+    (problem,) = check_second_signals(
+        changed(drive(20), "engine_load", change), learnt("mass_air_flow")
+    )
     assert problem.serious
     assert problem.signal == "engine_load"
     found = {"start": problem.start, "end": problem.end, **problem.values}
@@ -185,7 +187,7 @@ def test_every_method_refuses_it(method):
 
 def test_a_moderate_disagreement_is_a_warning():
     made = changed(drive(20), "engine_load", lambda t, x: 0.93 * x)
-    (problem,) = check_witnesses(made, learnt("mass_air_flow"))
+    (problem,) = check_second_signals(made, learnt("mass_air_flow"))
     assert not problem.serious
     assert problem.values["scale"] == pytest.approx(0.93, abs=0.005)
     assert problem.values["witnesses"] == "mass_air_flow"
@@ -216,14 +218,14 @@ def test_where_the_change_begins_is_told():
 def test_a_small_change_in_the_drive_is_told_against_what_was_before():
     # 3 % up before and down after: neither leaves what drives of one car differ by.
     made = changed(drive(20), "engine_load", lambda t, x: np.where(t < MIDDLE, 1.03, 0.97) * x)
-    (problem,) = check_witnesses(made, learnt("mass_air_flow"))
+    (problem,) = check_second_signals(made, learnt("mass_air_flow"))
     assert not problem.serious
     assert problem.id == "torque.witness"
 
 
 def test_two_witnesses_say_that_the_reading_is_wrong():
     made = changed(drive(20), "engine_load", lambda t, x: 0.8 * x)
-    (problem,) = check_witnesses(made, learnt("mass_air_flow", "intake_pressure"))
+    (problem,) = check_second_signals(made, learnt("mass_air_flow", "intake_pressure"))
     assert problem.serious
     assert problem.values["witnesses"] == "mass_air_flow and intake_pressure"
     assert problem.values["which"] == phrase("reading_wrong", reading="engine_load")
@@ -231,7 +233,7 @@ def test_two_witnesses_say_that_the_reading_is_wrong():
 
 def test_a_witness_alone_against_another_is_off_itself():
     made = changed(drive(20), "mass_air_flow", lambda t, x: 0.7 * x)
-    (problem,) = check_witnesses(made, learnt("mass_air_flow", "intake_pressure"))
+    (problem,) = check_second_signals(made, learnt("mass_air_flow", "intake_pressure"))
     assert not problem.serious
     assert problem.signal == "mass_air_flow"
     assert problem.id == "witness.off"
@@ -242,16 +244,16 @@ def test_a_witness_alone_against_another_is_off_itself():
 def test_more_fuel_than_torque_is_doubted_and_less_refused():
     fuel = learnt("fuel_rate")
     regenerating = changed(drive(20), "fuel_rate", lambda t, x: 1.25 * x)
-    (problem,) = check_witnesses(regenerating, fuel)
+    (problem,) = check_second_signals(regenerating, fuel)
     assert not problem.serious
-    (problem,) = check_witnesses(changed(drive(20), "fuel_rate", lambda t, x: 0.8 * x), fuel)
+    (problem,) = check_second_signals(changed(drive(20), "fuel_rate", lambda t, x: 0.8 * x), fuel)
     assert problem.serious
 
 
 def test_what_a_person_vouches_for_gives_a_mass():
     made = changed(drive(20), "engine_load", lambda t, x: 0.8 * x)
     made = replace(made, info=replace(made.info, trusted=("engine_load",)))
-    (problem,) = check_witnesses(made, learnt("mass_air_flow"))
+    (problem,) = check_second_signals(made, learnt("mass_air_flow"))
     assert not problem.serious
 
 
@@ -262,7 +264,7 @@ def test_thin_air_is_no_fault(normalised):
         ("mass_air_flow",), [drive(seed, normalised=normalised) for seed in (1, 2, 3)], CAR
     )
     high = drive(20, warm=303.0, pressure=0.82e5, normalised=normalised)
-    assert check_witnesses(high, car) == ()
+    assert check_second_signals(high, car) == ()
     # Without the air known to the check the same drive would be doubted, one way or the other.
     (found,) = findings(high, car)
     assert abs(found.scale - 1.0) < 0.02 if not normalised else found.scale > 1.15
@@ -315,26 +317,28 @@ def test_delays_gaps_jitter_and_dropouts_are_no_fault():
         ),
     }
     for what, spoilt in harmless.items():
-        assert not any(p.serious for p in check_witnesses(spoilt, learnt("mass_air_flow"))), what
+        assert not any(p.serious for p in check_second_signals(spoilt, learnt("mass_air_flow"))), (
+            what
+        )
 
 
 def test_nothing_is_said_where_nothing_can_be():
     made = drive(20)
-    assert check_witnesses(made, None) == ()
-    assert check_witnesses(made, CAR) == ()
-    assert check_witnesses(made.without("mass_air_flow"), learnt("mass_air_flow")) == ()
-    assert check_witnesses(made.without("engine_load"), learnt("mass_air_flow")) == ()
-    assert check_witnesses(made.without("vehicle_speed"), learnt("mass_air_flow")) == ()
-    assert check_witnesses(made.between(0.0, 60.0), learnt("mass_air_flow")) == ()
+    assert check_second_signals(made, None) == ()
+    assert check_second_signals(made, CAR) == ()
+    assert check_second_signals(made.without("mass_air_flow"), learnt("mass_air_flow")) == ()
+    assert check_second_signals(made.without("engine_load"), learnt("mass_air_flow")) == ()
+    assert check_second_signals(made.without("vehicle_speed"), learnt("mass_air_flow")) == ()
+    assert check_second_signals(made.between(0.0, 60.0), learnt("mass_air_flow")) == ()
     empty = Signal("mass_air_flow", np.zeros(0), np.zeros(0))
-    assert check_witnesses(made.with_signals(empty), learnt("mass_air_flow")) == ()
+    assert check_second_signals(made.with_signals(empty), learnt("mass_air_flow")) == ()
     still = changed(made, "engine_speed", lambda t, x: 0.0 * x)
-    assert check_witnesses(still, learnt("mass_air_flow")) == ()
+    assert check_second_signals(still, learnt("mass_air_flow")) == ()
 
 
 def test_calibration_drives_that_contradict_each_other_are_told():
     off = changed(drive(4), "engine_load", lambda t, x: 0.8 * x)
-    found, doubts = learn_witnesses([*known_drives()[:2], off], CAR)
+    found, doubts = learn_second_signals([*known_drives()[:2], off], CAR)
     assert found == ()
     assert len(doubts) == 3
     assert doubts[0].id == "calibration.drives_contradict"
@@ -363,14 +367,14 @@ def electric_drive(seed, heating=0.0, read=1.0):
 
 
 def test_a_battery_bears_witness_of_a_motor_whatever_is_heated():
-    found, _ = learn_witnesses([electric_drive(seed) for seed in (1, 2)], ELECTRIC)
+    found, _ = learn_second_signals([electric_drive(seed) for seed in (1, 2)], ELECTRIC)
     assert [w.signal for w in found] == ["battery_current"]
     car = replace(ELECTRIC, witnesses=found)
-    assert check_witnesses(electric_drive(3, heating=4000.0), car) == ()
+    assert check_second_signals(electric_drive(3, heating=4000.0), car) == ()
     (found,) = findings(electric_drive(3, read=0.8), car)
     assert_allclose(found.scale, 0.8, atol=0.015)
     # Heating that changes on the way looks alike: it is told, and weighed.
-    (problem,) = check_witnesses(electric_drive(3, read=0.8), car)
+    (problem,) = check_second_signals(electric_drive(3, read=0.8), car)
     assert not problem.serious
     assert (problem.id, problem.values["witnesses"]) == ("torque.witness", "battery_current")
 
@@ -397,7 +401,7 @@ def test_a_relation_is_one_of_a_known_signal():
             replace(good, **fields)
     with pytest.raises(wb.ConfigError, match="may be named once"):
         replace(CAR, witnesses=(good, good))
-    assert isinstance(good, WitnessRelation)
+    assert isinstance(good, SecondSignalRelation)
 
 
 def test_a_witness_that_only_unknown_air_makes_agree_clears_nothing():
@@ -412,7 +416,9 @@ def test_a_witness_that_only_unknown_air_makes_agree_clears_nothing():
     assert len(known.witnesses) == 2
     for scale in (0.88, 1.12):
         made = told(replace(drive(20), info=DriveInfo()))
-        found = check_witnesses(changed(made, "engine_torque", lambda t, x, k=scale: k * x), known)
+        found = check_second_signals(
+            changed(made, "engine_torque", lambda t, x, k=scale: k * x), known
+        )
         assert [p.signal for p in found] == ["engine_torque"]
 
 
@@ -421,9 +427,10 @@ def test_a_witness_that_froze_or_is_on_another_clock_accuses_nobody():
         return np.where(time < 900.0, x, x[np.searchsorted(time, 900.0)])
 
     assert (
-        check_witnesses(changed(drive(20), "mass_air_flow", stuck), learnt("mass_air_flow")) == ()
+        check_second_signals(changed(drive(20), "mass_air_flow", stuck), learnt("mass_air_flow"))
+        == ()
     )
     late = drive(20)
     air = late.signals["mass_air_flow"]
     late = late.with_signals(Signal(air.name, air.time + 2.5, air.values))
-    assert not any(p.serious for p in check_witnesses(late, learnt("mass_air_flow")))
+    assert not any(p.serious for p in check_second_signals(late, learnt("mass_air_flow")))

@@ -128,13 +128,13 @@ def find_brakes(
     need, torque = measured * needed / weight, measured * needed / table.gearing
     by = setup.foot if setup is not None else identify_foot(drive, vehicle, source, need, torque)
     foot = find_foot(drive, vehicle, source, need, torque, by)
-    # What a dragged engine takes is told by a torque alone, and by none where a foot may brake,
+    # What a dragged engine takes is shown by a torque alone, and by none where a foot may brake,
     # or a retarder.
     released = signed and pressed is not None and not retarder_untold(drive, vehicle)
     overrun = np.zeros_like(foot.off) if released else foot.off
     slowed = foot.off if pressed is None else pressed
-    told = traction if signed else None
-    held = _trailing(vehicle, motion, table.time, slowed, told, lag, forward=by.forward)
+    reported = traction if signed else None
+    held = _trailing(vehicle, motion, table.time, slowed, reported, lag, forward=by.forward)
     slows = (needed < -SLOWED * weight)[slowing.moving]
     hidden = pressed is None and not foot.observable and slows.size and slows.mean() > SLOWS
     return Brakes(

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from weighbridge.balance.witness import (
+from weighbridge.balance.second_signal import (
     BY_SIGNAL,
     FEWEST_MEANS,
     air_of,
@@ -26,12 +26,12 @@ from weighbridge.vehicle.model import Vehicle
 
 
 def in_this_air(drive: Drive, vehicle: Vehicle) -> Vehicle:
-    """Return the vehicle with the power of the charge that the drive's witnesses show.
+    """Return the vehicle with the power of the charge that the drive's second signals show.
 
     Parameters
     ----------
     drive
-    vehicle : itself where its reading does not change with the air, or no witness shows
+    vehicle : itself where its reading does not change with the air, or no second signal shows
 
     References
     ----------
@@ -43,14 +43,14 @@ def in_this_air(drive: Drive, vehicle: Vehicle) -> Vehicle:
         return vehicle
     variance = std**2
     for relation in vehicle.witnesses:
-        witness = BY_SIGNAL[relation.signal]
-        by_pressure, by_heat = witness.air
-        if witness.enriched or by_pressure != (0.0, 0.0):
+        second_signal = BY_SIGNAL[relation.signal]
+        by_pressure, by_heat = second_signal.air
+        if second_signal.enriched or by_pressure != (0.0, 0.0):
             continue
-        rows = rows_of(drive, vehicle, witness)
+        rows = rows_of(drive, vehicle, second_signal)
         if rows is None or relation.pressure is None or relation.temperature is None:
             continue
-        part = means(rows, witness, ranges_of(relation))
+        part = means(rows, second_signal, ranges_of(relation))
         if part.time.size < FEWEST_MEANS:
             continue
         found = compare(part.reading, predicted_by(relation, part))
@@ -59,7 +59,7 @@ def in_this_air(drive: Drive, vehicle: Vehicle) -> Vehicle:
         denser = float(np.log(pressure / relation.pressure)) - 0.5 * warmer
         if not (found.scale > 0.0 and np.isfinite(denser)):
             continue
-        # The reading over the witness falls by this power of the charge.
+        # The reading over the second signal falls by this power of the charge.
         off = np.log(found.scale) + exponent * denser + np.mean(by_heat) * warmer
         noise = float(np.hypot(found.scale_std, relation.scale_std))
         noise = float(np.hypot(noise, np.ptp(by_heat) * warmer))

@@ -1,4 +1,4 @@
-"""What the steps of a coarse torque reading leave open in a mass."""
+"""What the steps of a coarse torque reading leave uncertain in a mass."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ FINE: Final = 0.025
 """Steps of a reading over its range that do no harm [-]: control units send 0.4 and 1 %."""
 
 LEAST: Final = 0.01
-"""What is left open below is not told [-]."""
+"""What is not estimated below is not reported [-]."""
 
 ROUNDING: Final = 1.0 / math.sqrt(12.0)
 """Standard deviation of an even error over its step [-]."""
@@ -44,7 +44,7 @@ def coarse_std(source: Signal, usable: Bools) -> float:
 
 
 def coarse_note(std: float) -> tuple[Problem, ...]:
-    """Say what the steps leave open; nothing where it is little."""
+    """Say what the steps leave uncertain; nothing where it is little."""
     if std <= LEAST:
         return ()
     return (Problem.of("torque.coarse", share=100.0 * std),)

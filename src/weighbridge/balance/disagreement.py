@@ -1,4 +1,4 @@
-"""Does the torque's reading still go with its witnesses as in the calibration?"""
+"""Does the torque's reading still go with its second signals as in the calibration?"""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Final, Literal
 
 import numpy as np
 
-from weighbridge.balance.witness import (
+from weighbridge.balance.second_signal import (
     BY_SIGNAL,
     DELAYS,
     FEWEST_MEANS,
@@ -27,18 +27,18 @@ from weighbridge.balance.witness import (
 )
 from weighbridge.messages import phrase
 from weighbridge.signals import Drive
-from weighbridge.vehicle.model import Vehicle, WitnessRelation
+from weighbridge.vehicle.model import SecondSignalRelation, Vehicle
 
-DOUBTFUL: Final = 0.05
-"""Scale, or level over the reading's range, off by more is doubted [-]."""
+QUESTIONABLE: Final = 0.05
+"""Scale, or level over the reading's range, off by more is questioned [-]."""
 
 SERIOUS: Final = 0.09
 """The same, above which there is no mass [-]: the mass is off by 1.1 to 1.5 times as much."""
 
-DOUBT_SURE: Final = 2.0
+QUESTION_SURE: Final = 2.0
 SURE: Final = 3.5
 """Standard deviations by which it has to be off for the one and for the other [-]. With these, 8 of
-1184 pairs of calibration and drive of recorded vehicles were doubted (a petrol car's load by
+1184 pairs of calibration and drive of recorded vehicles were questioned (a petrol car's load by
 intake pressure, another's torque by it, an electric car by its battery), and 2 refused beside those
 with a trip whose torque repeats one value to its end."""
 
@@ -47,7 +47,7 @@ LEVEL_STD: Final = 0.02
 recorded trips of a petrol car had -0.03 to 0.025 in 19 of 20 pairs."""
 
 CHANGE: Final = 0.04
-"""As `DOUBTFUL`, between two parts of a drive, in which what differs between drives is the same
+"""As `QUESTIONABLE`, between two parts of a drive, in which what differs between drives is the same
 [-]."""
 
 CHANGED: Final = 5.0
@@ -86,8 +86,8 @@ NOISIER: Final = 1.4
 smoothed readings of simulated drives, 1.6 to 3 for an engine speed with dropouts."""
 
 LATER: Final = 0.5
-"""A reading later or earlier against its witness by so much is moved [s]; what its lateness does to
-the mass is judged against the motion."""
+"""A reading later or earlier against its second signal by so much is moved [s]; what its lateness
+does to the mass is judged against the motion."""
 
 Verdict = Literal["agrees", "doubtful", "serious"]
 _ORDER: Final[tuple[Verdict, ...]] = ("agrees", "doubtful", "serious")
@@ -95,18 +95,18 @@ _ORDER: Final[tuple[Verdict, ...]] = ("agrees", "doubtful", "serious")
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """What one witness says of the reading in a drive.
+    """What one second signal says of the reading in a drive.
 
     Attributes
     ----------
-    signal : of the witness
+    signal : of the second signal
     verdict
-    scale : reading over what the witness shows [-]
+    scale : reading over what the second signal shows [-]
     offset : reading less what it shows, over the reading's range [-]
     scaled : whether it is the scale that is off, not the level
     start, end : of the part that is off [s]; infinite for the ends of the drive
     before : the part is off against the one before it, not against the calibration
-    blur : time constant by which the reading is smoother than the witness [s]; 0 if not so
+    blur : time constant by which the reading is smoother than the second signal [s]; 0 if not so
     """
 
     signal: str
@@ -126,24 +126,24 @@ class Finding:
 
 
 def findings(drive: Drive, vehicle: Vehicle) -> tuple[Finding, ...]:
-    """What each witness of a vehicle file that can judge says of a drive's torque reading."""
+    """What each second signal of a vehicle file that can judge says of a drive's torque reading."""
     found = (_finding(drive, vehicle, relation) for relation in vehicle.witnesses)
     return tuple(f for f in found if f is not None)
 
 
-def _finding(drive: Drive, vehicle: Vehicle, relation: WitnessRelation) -> Finding | None:
-    witness = BY_SIGNAL[relation.signal]
-    rows = rows_of(drive, vehicle, witness)
+def _finding(drive: Drive, vehicle: Vehicle, relation: SecondSignalRelation) -> Finding | None:
+    second_signal = BY_SIGNAL[relation.signal]
+    rows = rows_of(drive, vehicle, second_signal)
     if rows is None:
         return None
-    following = follow(rows, witness, relation)
+    following = follow(rows, second_signal, relation)
     if following is not None and _smoothed(following, relation):
         return Finding(relation.signal, "serious", 1.0, 0.0, blur=following.blur)
     if following is not None and following.lag in (DELAYS[0], DELAYS[-1]):
         return None  # It is on another clock, further away than was tried.
     if following is not None and abs(later := following.lag - (relation.lag or 0.0)) >= LATER:
-        rows = rows_of(drive, vehicle, witness, later) or rows
-    every = means(rows, witness, ranges_of(relation))
+        rows = rows_of(drive, vehicle, second_signal, later) or rows
+    every = means(rows, second_signal, ranges_of(relation))
     if every.time.size < FEWEST_MEANS:
         return None
     source, many = vehicle.torque.of_source.name, every.time.size
@@ -177,9 +177,9 @@ def _part(every: Means, first: int, last: int) -> Means:
 
 
 def _against_before(
-    drive: Drive, source: str, relation: WitnessRelation, every: Means, cut: int
+    drive: Drive, source: str, relation: SecondSignalRelation, every: Means, cut: int
 ) -> Finding:
-    """Judge the second part of a drive by how reading and witness went in the first."""
+    """Judge the second part of a drive by how reading and second signal went in the first."""
     first, second = _part(every, 0, cut), _part(every, cut, every.time.size)
     air = air_of(drive, float(first.time[0]), float(first.time[-1]))
     later = air_of(drive, float(second.time[0]), float(second.time[-1]))
@@ -194,14 +194,15 @@ def _against_before(
         accepted,
         (float(np.hypot(a.scale_std, b.scale_std)), float(np.hypot(a.level_std, b.level_std))),
         Finding(relation.signal, "agrees", 1.0, 0.0, start=float(second.time[0]), before=True),
-        doubtful=CHANGE,
+        questionable=CHANGE,
     )
 
 
-def _smoothed(found: Following, relation: WitnessRelation) -> bool:
+def _smoothed(found: Following, relation: SecondSignalRelation) -> bool:
     """Say whether a reading is smoother than in the calibration.
 
-    A noisy witness, smoothed, goes better with the reading as well, but not as well as it did.
+    A noisy second signal, smoothed, goes better with the reading as well, but not as well as it
+    did.
     """
     if relation.blur is None or relation.unexplained is None:
         return False
@@ -214,7 +215,7 @@ def _smoothed(found: Following, relation: WitnessRelation) -> bool:
 
 def judged(
     part: Means,
-    relation: WitnessRelation,
+    relation: SecondSignalRelation,
     accepted: tuple[float, float],
     when: tuple[float, float] = (-np.inf, np.inf),
 ) -> Finding | None:
@@ -249,12 +250,12 @@ def judged(
 
 def _judged(
     found: Comparison,
-    relation: WitnessRelation,
+    relation: SecondSignalRelation,
     accepted: tuple[float, float],
     stds: tuple[float, float],
     finding: Finding,
     *,
-    doubtful: float = DOUBTFUL,
+    questionable: float = QUESTIONABLE,
 ) -> Finding:
     """Complete a finding by what was found.
 
@@ -264,17 +265,17 @@ def _judged(
     accepted : scales that the air explains [-]
     stds : of scale [-] and level [unit of the reading]
     finding : with the part of the drive it is of
-    doubtful : limit of what is doubted [-]
+    questionable : limit of what is questioned [-]
     """
-    witness = BY_SIGNAL[relation.signal]
+    second_signal = BY_SIGNAL[relation.signal]
     low, high = accepted
     scale_off = max(low - found.scale, found.scale - high, 0.0)
     predicted = sorted((low * found.predicted, high * found.predicted))
     level_off = max(predicted[0] - found.level, found.level - predicted[1], 0.0) / relation.span
-    if witness.battery:
+    if second_signal.battery:
         level_off = 0.0  # Heating and cooling come and go.
-    by_scale = _verdict(scale_off, stds[0], doubtful)
-    by_level = _verdict(level_off, stds[1] / relation.span, doubtful)
+    by_scale = _verdict(scale_off, stds[0], questionable)
+    by_level = _verdict(level_off, stds[1] / relation.span, questionable)
     verdict = max(by_scale, by_level, key=_ORDER.index)
     finding = replace(
         finding,
@@ -283,19 +284,21 @@ def _judged(
         scaled=_ORDER.index(by_scale) >= _ORDER.index(by_level),
     )
     # Of what a battery gives, heating takes a part that may change on the way.
-    if verdict == "serious" and (witness.battery or (witness.enriched and finding.sign < 0)):
+    if verdict == "serious" and (
+        second_signal.battery or (second_signal.enriched and finding.sign < 0)
+    ):
         verdict = "doubtful"
     return replace(finding, verdict=verdict)
 
 
-def _verdict(off: float, std: float, doubtful: float) -> Verdict:
+def _verdict(off: float, std: float, questionable: float) -> Verdict:
     if off > max(SERIOUS, SURE * std):
         return "serious"
-    return "doubtful" if off > max(doubtful, DOUBT_SURE * std) else "agrees"
+    return "doubtful" if off > max(questionable, QUESTION_SURE * std) else "agrees"
 
 
-def _change(every: Means, relation: WitnessRelation) -> int | None:
-    """Find where reading and witness begin to go otherwise: first row of the second part."""
+def _change(every: Means, relation: SecondSignalRelation) -> int | None:
+    """Find where reading and second signal begin to go otherwise: first row of the second part."""
     predicted = predicted_by(relation, every)
     best, at = 0.0, None
     for k in range(1, PARTS):
@@ -313,13 +316,13 @@ def _change(every: Means, relation: WitnessRelation) -> int | None:
     return at
 
 
-def _offs(a: Line, b: Line, relation: WitnessRelation) -> tuple[float, float]:
+def _offs(a: Line, b: Line, relation: SecondSignalRelation) -> tuple[float, float]:
     """By how much scale and level of two parts differ [-]."""
     level = abs((a.level - a.predicted) - (b.level - b.predicted)) / relation.span
     return abs(a.scale - b.scale), level
 
 
-def _apart(a: Comparison, b: Comparison, relation: WitnessRelation) -> float:
+def _apart(a: Comparison, b: Comparison, relation: SecondSignalRelation) -> float:
     """By how many standard deviations two parts differ surely [-]; 0 where they do not."""
     scale, level = _offs(a, b, relation)
     scale_std = float(np.hypot(a.scale_std, b.scale_std))
@@ -334,11 +337,11 @@ def _apart(a: Comparison, b: Comparison, relation: WitnessRelation) -> float:
 
 def accepted_scales(
     source: str,
-    relation: WitnessRelation,
+    relation: SecondSignalRelation,
     air: tuple[float, float],
     unknown: float | None = None,
 ) -> tuple[float, float]:
-    """Scales of reading over witness that the air explains: lowest and highest [-].
+    """Scales of reading over second signal that the air explains: lowest and highest [-].
 
     Parameters
     ----------
@@ -364,7 +367,7 @@ def accepted_scales(
 
 
 def difference(finding: Finding) -> str:
-    """How the reading differs from what the witness shows, in words."""
+    """How the reading differs from what the second signal shows, in words."""
     if finding.scaled:
         return phrase("as_much", scale=finding.scale)
     which = "range_more" if finding.sign > 0 else "range_less"

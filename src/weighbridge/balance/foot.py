@@ -85,7 +85,7 @@ def find_foot(
 
     Two hidden states, dragged and pushing, of which a dragged engine reads its floor and a
     pushing one anything above: so the noise of a reading does not choose rows one by one.
-    Where the position of the accelerator is told and it is pressed, no foot is on the brake.
+    Where the position of the accelerator is reported and it is pressed, no foot is on the brake.
 
     Parameters
     ----------

@@ -187,7 +187,7 @@ def learn_dragged(
 
 
 def turning_at(drive: Drive, source: Signal) -> Floats:
-    """Engine speed at the stamps of the source (n,) [rad/s]; NaN where it is not told."""
+    """Engine speed at the stamps of the source (n,) [rad/s]; NaN where it is not reported."""
     engine = drive.get("engine_speed")
     return engine.at(source.time) if engine is not None else np.full(len(source), np.nan)
 

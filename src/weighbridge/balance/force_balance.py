@@ -252,7 +252,7 @@ def _read(
 
 
 def _air_std(vehicle: Vehicle, torque_of: Callable[[float], Torque]) -> float:
-    """What the air leaves open of the torque, which reads other air than in the calibration [-]."""
+    """What the air leaves uncertain of the torque: it is not that of the calibration [-]."""
     _, std = vehicle.torque.in_thin_air
     if vehicle.torque.charge is None or std == 0.0:
         return 0.0

@@ -28,7 +28,7 @@ PAUSE: Final = 60.0
 """After so long without rows another recording may begin [s]."""
 
 _CRUISE: Final = 100.0 / 3.6
-"""Speed at which a ratio is told as an engine speed [m/s]."""
+"""Speed at which a ratio is reported as an engine speed [m/s]."""
 
 SLOWEST: Final = 3.0
 """Below, clutches slip [m/s]."""

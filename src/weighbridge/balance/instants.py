@@ -174,7 +174,7 @@ def ratio_rate(
     return np.where(known, faster - accel / np.where(known, speed, 1.0), np.nan)
 
 
-def identify_told_gears(
+def identify_reported_gears(
     drive: Drive, vehicle: Vehicle, recorded: Floats, engine_speed: Floats, speed: Floats
 ) -> Mapping[int, int]:
     """Find which gears of the vehicle file are those that the gearbox reports."""
@@ -196,7 +196,7 @@ def gears_at(
 ) -> tuple[Ints, Floats, Bools]:
     """Gear, gearing and whether the clutch slips, from the best source there is.
 
-    ``numbers`` are those of `identify_told_gears`.
+    ``numbers`` are those of `identify_reported_gears`.
     """
     gearings = np.array(vehicle.driveline.gearings)
     if gearings.size == 1:
@@ -241,7 +241,7 @@ class Instants:
     known : (n,) the motion is known
     slipping : (n,) the clutch slips
     changing : (n,) the gear changes soon or has just changed
-    numbers : of `identify_told_gears`
+    numbers : of `identify_reported_gears`
     engine_delay : of `identify_engine_delay` [s]
     """
 
@@ -272,7 +272,7 @@ def read_instants(
     drive, vehicle, motion
     recorded : (n,) stamps of the torque [s]
     delay : by which they are late [s]
-    numbers : of `identify_told_gears`; found from this drive when None
+    numbers : of `identify_reported_gears`; found from this drive when None
     engine_delay : of `identify_engine_delay`; found from this drive when None [s]
     ahead : how far past a row others may show it [s]
     """
@@ -288,7 +288,7 @@ def read_instants(
         read_at, rolling = recorded, interpolate_motion(motion, recorded - engine_delay)["speed"]
     engine_speed = engine_speed_at(drive, vehicle, read_at, speed)
     if numbers is None:
-        numbers = identify_told_gears(drive, vehicle, recorded, engine_speed, speed)
+        numbers = identify_reported_gears(drive, vehicle, recorded, engine_speed, speed)
     gear, gearing, slipping = gears_at(drive, vehicle, recorded, engine_speed, rolling, numbers)
     changing = shifting(time, gear, margin=SHIFT_MARGIN, ahead=ahead)
     if vehicle.driveline.single_speed:

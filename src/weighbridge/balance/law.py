@@ -182,7 +182,7 @@ def torque_growth_column(table: ForceTable) -> Floats:
 def accessory_column(table: ForceTable, vehicle: Vehicle) -> Floats:
     """Of a power that an engine gives to accessories, ``eta G / N`` (n,) [N/W]; 0 for a motor.
 
-    A torque that is told at the crank counts it as traction.
+    A torque that is reported at the crank counts it as traction.
     """
     if vehicle.driveline.single_speed:
         return np.zeros(table.time.size)

@@ -66,10 +66,10 @@ def shaken(drive: Drive, motion: Motion) -> Problem | None:
         return None
     rows = np.column_stack([np.interp(time - shift, time, force) for shift in SHIFTS])
     off = rows @ np.linalg.lstsq(rows, shown, rcond=None)[0] - shown
-    return _told((off - float(np.mean(off))) / SPAN, revs, apart)
+    return _reported((off - float(np.mean(off))) / SPAN, revs, apart)
 
 
-def _told(off: Floats, revs: Floats, apart: float) -> Problem | None:
+def _reported(off: Floats, revs: Floats, apart: float) -> Problem | None:
     """Judge the differences (n,) [m/s^2] by engine speed (n,) [rad/s]."""
     edges = np.percentile(revs, np.linspace(0.0, 100.0, BANDS + 1))
     band = np.clip(np.searchsorted(edges, revs) - 1, 0, BANDS - 1)

@@ -25,7 +25,7 @@ MOVING: Final = 0.5
 """Slower a vehicle stands [m/s]."""
 
 UNKNOWN_AIR: Final = 0.02
-"""What the air leaves open of the torque is reported from here on [-]."""
+"""What the air leaves uncertain of the torque is reported from here on [-]."""
 
 
 class Reason(IntEnum):
@@ -164,7 +164,7 @@ class ForceSetup:
     gears : number of the vehicle file's gear as the gearbox reports it
     engine_delay : lateness of the engine speed [s]
     air : temperature and pressure
-    air_std : what the air leaves open of the torque [-]
+    air_std : what the air leaves uncertain of the torque [-]
     full_torque : torque of the engine that the drive hardly exceeds [N m]
     torque_noise : of one torque [N m]
     fill : how readings that a logger filled in would look; None where they cannot be seen

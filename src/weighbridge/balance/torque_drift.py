@@ -104,7 +104,7 @@ def _best(force: Floats, moved: Floats) -> float:
     return float(SHIFTS[k] + step * (SHIFTS[1] - SHIFTS[0]))
 
 
-def steadied(
+def smoothed_steps(
     drive: Drive, vehicle: Vehicle, motion: Motion, delay: float
 ) -> tuple[Drive, tuple[Problem, ...], ForceBalance | None]:
     """Move the stamps of a torque that drifts, so that it stays as late as it began.
@@ -139,8 +139,8 @@ def steadied(
         return drive, (), balance
     moved = carrier.time - slope * (carrier.time - before.time[0])
     rising = np.concatenate(([True], np.diff(np.maximum.accumulate(moved)) > 0.0))
-    mended = drive.with_signals(Signal(carrier.name, moved[rising], carrier.values[rising]))
-    balance = force_balance(mended, vehicle, motion, delay=delay)
+    corrected = drive.with_signals(Signal(carrier.name, moved[rising], carrier.values[rising]))
+    balance = force_balance(corrected, vehicle, motion, delay=delay)
     after = force_lags(balance.table, vehicle, motion)
     if after.lag.size >= FEWEST_PARTS and np.ptp(_median_of_three(after.lag)) > WANDERS:
         raise _wanders(drive, carrier, before)
@@ -148,7 +148,7 @@ def steadied(
     note = Problem.of(
         "torque.late_drift", carrier.name, grows=grows, change=abs(slope) * reach, reach=reach
     )
-    return mended, (note,), balance
+    return corrected, (note,), balance
 
 
 def _wanders(drive: Drive, carrier: Signal, found: ForceLags) -> DriveError:

@@ -50,13 +50,13 @@ def in_their_air(problem: Problem, vehicle: Vehicle) -> Problem | None:
     if len(off) < 2 or np.ptp(denser) < APART:
         return None
     x = USUAL_SLOPE * (np.array(denser) - np.mean(denser))
-    told = float(x @ x) / BETWEEN_STD**2
+    reported = float(x @ x) / BETWEEN_STD**2
     # Of the power in use, less that of the vehicle.
-    surplus = float(x @ np.array(off)) / BETWEEN_STD**2 / (told + 1.0 / std**2)
+    surplus = float(x @ np.array(off)) / BETWEEN_STD**2 / (reported + 1.0 / std**2)
     torque = replace(
         problem.draft.torque,
         charge_exponent=float(np.clip(exponent - surplus, -1.0, 2.0)),
-        charge_exponent_std=float(1.0 / np.sqrt(told + 1.0 / std**2)),
+        charge_exponent_std=float(1.0 / np.sqrt(reported + 1.0 / std**2)),
     )
     draft = replace(problem.draft, torque=torque)
     return replace(

@@ -49,7 +49,7 @@ class DriveRows:
     usable : rows to take
     mass : known, as the drive begins [kg]
     motion : of the drive
-    beside : (n,) force that the torque gives beside the wheels, told by another fit [N]
+    beside : (n,) force that the torque gives beside the wheels, shown by another fit [N]
     """
 
     table: ForceTable
@@ -244,7 +244,7 @@ def fit(drives: list[DriveRows], settings: FitSettings) -> InverseFit:
     is regressed: ``w1 G L = m f + C_d A q + ... - G (w0 + w2 N + ...)`` is
     divided by w1, which keeps the problem linear. The curvature needs the
     reading on the right as well; there the fitted one of the round before
-    stands in its place, so that no noise enters. It is centred: a curve whose
+    is in its place, so that no noise enters. It is centred: a curve whose
     mean is not zero would explain the reading by itself.
 
     Parameters

@@ -37,7 +37,7 @@ flow and its ratio: the best engines have as much at their best point, and nothi
 DRAG_FAR: Final = 2.5
 """Standard deviations of the class from which a drag area is reported [-]."""
 
-DOUBTFUL: Final = 3.0
+QUESTIONABLE: Final = 3.0
 """Standard deviations from which such a scale is reported [-]."""
 
 
@@ -104,7 +104,7 @@ def scale_by_mass(vehicle: Vehicle) -> float:
     return slope / usual_efficiency(vehicle)[0]
 
 
-def scale_doubt(vehicle: Vehicle, masses: list[float], names: str) -> Problem | None:
+def scale_finding(vehicle: Vehicle, masses: list[float], names: str) -> Problem | None:
     """Compare the scale that a calibration gives a torque in N m or percent with a data sheet's.
 
     Parameters
@@ -123,7 +123,7 @@ def scale_doubt(vehicle: Vehicle, masses: list[float], names: str) -> Problem | 
         No torque is so far off.
     """
     ratio, std = scale_by_mass(vehicle), scale_std(vehicle)
-    if abs(ratio - 1.0) <= DOUBTFUL * std:
+    if abs(ratio - 1.0) <= QUESTIONABLE * std:
         return None
     listed = " and ".join(f"{kg:.0f}" for kg in masses)
     likely = " and ".join(f"{kg / ratio:.0f}" for kg in masses)
@@ -141,7 +141,7 @@ def scale_doubt(vehicle: Vehicle, masses: list[float], names: str) -> Problem | 
     return Problem.of("calibration.scale", **found)
 
 
-def fuel_doubt(drive: Drive, balance: ForceBalance, kg: float) -> Problem | None:
+def fuel_finding(drive: Drive, balance: ForceBalance, kg: float) -> Problem | None:
     """Compare the work that a mass makes of the torque with the fuel that was burnt for it.
 
     Parameters
@@ -173,7 +173,7 @@ def fuel_doubt(drive: Drive, balance: ForceBalance, kg: float) -> Problem | None
     )
 
 
-def drag_doubt(vehicle: Vehicle, masses: list[float]) -> Problem | None:
+def drag_finding(vehicle: Vehicle, masses: list[float]) -> Problem | None:
     """Compare the air drag that a scale by mass alone gives a vehicle with that of its class.
 
     Parameters

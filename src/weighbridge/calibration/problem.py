@@ -16,7 +16,7 @@ from weighbridge.calibration.inverse import knots_between
 from weighbridge.calibration.known_mass import check_mass
 from weighbridge.calibration.recording import Recording
 from weighbridge.calibration.settings import CalibrationSettings
-from weighbridge.checks import mend_drive, refuse_serious
+from weighbridge.checks import correct_drive, refuse_serious
 from weighbridge.errors import ConfigError
 from weighbridge.estimators.squat import pooled, squat_at
 from weighbridge.messages import refused
@@ -32,7 +32,7 @@ from weighbridge.vehicle.model import Driveline, Mounting, TorqueModel, Vehicle
 from weighbridge.vehicle.torque import part_of_a_hybrid
 from weighbridge.vehicle.torque_sources import TORQUE_SOURCES, TorqueSource
 
-FEWEST_TOLD: Final = 10
+FEWEST_REPORTED: Final = 10
 """Samples of a gear below which a gear signal may be in error there."""
 
 FEW_READINGS: Final = 200
@@ -47,7 +47,7 @@ class Problem:
     ----------
     recordings : the drives of known mass
     base : what is known of the vehicle, as its torque source sees it
-    draft : the same with gears, source, witnesses and mounting found, without a torque model
+    draft : the same with gears, source, second signals and mounting found, without a torque model
     given : driveline of the vehicle file given to the calibration
     gears : ratios found; None where they were given
     source : of the torque
@@ -108,10 +108,10 @@ def checked(
         # Friction in the torque is no fault here: the fit finds it as an offset.
         model = replace(model, source=source, coefficients=(-1.0, 1.0))
     known = replace(base, torque=model, witnesses=())
-    mended = [mend_drive(drive, known) for drive in drives]
-    for drive in mended:
+    corrected = [correct_drive(drive, known) for drive in drives]
+    for drive in corrected:
         refuse_serious(drive.name, drive.problems)
-    return mended, base, masses
+    return corrected, base, masses
 
 
 def problem_of(
@@ -123,7 +123,7 @@ def problem_of(
 ) -> Problem:
     """Check what was given, and find motion, gears and torque source of the drives.
 
-    ``progress`` is told of drives done of all.
+    ``progress`` is informed of drives done of all.
 
     Raises
     ------
@@ -248,7 +248,7 @@ def _draft(
         engine_efficiency=base.torque.engine_efficiency,
         charge=_charge(drives, motions) if source.charge_exponent[0] else None,
     )
-    # A floor is told in the unit of its reading, and a witness is one of it.
+    # A floor is reported in the unit of its reading, and a second signal is one of it.
     same = base.torque.source == source.name
     return gears, replace(
         base,
@@ -293,11 +293,11 @@ def find_gears(
             raise refused("calibration.no_engine_speed", drive=drive.name)
     found = detect_gearings(*_aligned(drives, motions), idle_speed=idle_speed)
     found = detect_gearings(*_aligned(drives, motions, found.gearings), idle_speed=idle_speed)
-    told = _told_gears(drives)
-    if not told or found.gearings.size <= told:
+    reported = _reported_gears(drives)
+    if not reported or found.gearings.size <= reported:
         return found
     # Ratios that were passed on the way from gear to gear have few samples.
-    kept = np.sort(np.argsort(-found.counts, kind="stable")[:told])
+    kept = np.sort(np.argsort(-found.counts, kind="stable")[:reported])
     return replace(
         found,
         gearings=found.gearings[kept],
@@ -330,7 +330,7 @@ def _aligned(
     return _engine_and_speed(drives, motions, late)
 
 
-def _told_gears(drives: Sequence[Drive]) -> int:
+def _reported_gears(drives: Sequence[Drive]) -> int:
     """Forward gears that the gear signals of the drives show together; 0 where one has none."""
     gears: set[float] = set()
     for drive in drives:
@@ -338,7 +338,7 @@ def _told_gears(drives: Sequence[Drive]) -> int:
         if signal is None:
             return 0
         value, count = np.unique(signal.values[signal.values > 0.0], return_counts=True)
-        gears |= set(value[count >= FEWEST_TOLD].tolist())
+        gears |= set(value[count >= FEWEST_REPORTED].tolist())
     return len(gears)
 
 

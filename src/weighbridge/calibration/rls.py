@@ -10,7 +10,6 @@ import numpy as np
 from weighbridge.balance import ForceBalance, Reason
 from weighbridge.balance.delay import best_delay, delay_std
 from weighbridge.balance.law import ROAD_PARAMETERS
-from weighbridge.calibration.doubted_motion import gain_std
 from weighbridge.calibration.fitted import (
     Fitted,
     check_delay,
@@ -32,6 +31,7 @@ from weighbridge.calibration.regression import (
     fit,
     join_rows,
 )
+from weighbridge.calibration.uncertain_motion import gain_std
 from weighbridge.errors import ConfigError
 from weighbridge.estimators.judging import cold_share
 from weighbridge.estimators.regression import regression

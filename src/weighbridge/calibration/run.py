@@ -12,23 +12,23 @@ import numpy as np
 
 from weighbridge.arguments import check_type
 from weighbridge.balance import ForceBalance
-from weighbridge.balance.witness_learning import learn_witnesses
+from weighbridge.balance.second_signal_learning import learn_second_signals
 from weighbridge.calibration.charge import in_their_air
-from weighbridge.calibration.doubted_masses import (
-    doubted_masses,
-    refuse_too_heavy,
-    unbacked_scale,
-    with_doubts,
-)
 from weighbridge.calibration.fitted import Fitted, fitted_rows, noted, rebalanced
 from weighbridge.calibration.joint import fit_joint, fit_speed_torque
 from weighbridge.calibration.known_mass import (
-    drag_doubt,
-    fuel_doubt,
+    drag_finding,
+    fuel_finding,
     scale_by_mass,
-    scale_doubt,
+    scale_finding,
 )
 from weighbridge.calibration.problem import Problem, checked, problem_of
+from weighbridge.calibration.questionable_masses import (
+    questionable_masses,
+    refuse_too_heavy,
+    unbacked_scale,
+    with_findings,
+)
 from weighbridge.calibration.rls import fit_rls
 from weighbridge.calibration.settings import CalibrationSettings
 from weighbridge.calibration.speed import SpeedCalibration, calibrate_by_speed
@@ -129,7 +129,7 @@ def run_calibration(
     settings: CalibrationSettings | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Calibration:
-    """As `calibrate`, keeping what the report shows; ``progress`` is told of parts done of all."""
+    """As `calibrate`, keeping what the report shows; ``progress`` takes parts done of all."""
     settings = settings or CalibrationSettings()
     tell = progress or (lambda done, total: None)
     if not settings.fit.torque:
@@ -142,12 +142,12 @@ def run_calibration(
     rows = fitted_rows(fitted.vehicle, problem, fitted.rows)
     recorded = [r.drive for r in problem.recordings]
     motions = {r.motion.source for r in problem.recordings}
-    witnesses, contradictions = learn_witnesses(recorded, fitted.vehicle)
+    witnesses, contradictions = learn_second_signals(recorded, fitted.vehicle)
     done = replace(
         fitted.vehicle,
         torque=replace(
             fitted.vehicle.torque,
-            told_reference_torque=_told_reference(recorded, problem),
+            told_reference_torque=_stated_reference(recorded, problem),
             reading_step=_reading_step(recorded, problem),
         ),
         witnesses=witnesses or fitted.vehicle.witnesses,
@@ -163,11 +163,11 @@ def run_calibration(
         ),
     )
     balances = tuple(rebalanced(problem, done))
-    of_masses = _mass_doubts(done, recorded, balances, problem)
+    of_masses = _mass_findings(done, recorded, balances, problem)
     few, line = Message.of("calibration.few", samples=rows.time.size), done.driveline
     doubts = [
         *of_masses,
-        *doubted_masses(done, balances, problem.masses),
+        *questionable_masses(done, balances, problem.masses),
     ]
     others: list[Message | None] = [
         *([few] if rows.time.size < FEW_SAMPLES else []),
@@ -179,7 +179,7 @@ def run_calibration(
     ]
     notes = [note for note in (*others, *unbacked_scale(done)) if note is not None]
     done = _with_notes(done, balances, notes)
-    done = with_doubts(done, doubts)
+    done = with_findings(done, doubts)
     if problem.source.gearing is not None:
         done = _with_gears(done, problem.given)
     _refuse_useless(done)
@@ -198,17 +198,17 @@ def run_calibration(
     )
 
 
-def _mass_doubts(
+def _mass_findings(
     vehicle: Vehicle, drives: Sequence[Drive], balances: Sequence[ForceBalance], problem: Problem
 ) -> list[Message]:
     """Say what torque, drag and fuel show against the masses; refuse those above gross as well."""
     masses = problem.masses
-    scale = scale_doubt(vehicle, masses, problem.names)
+    scale = scale_finding(vehicle, masses, problem.names)
     each = zip(drives, balances, masses, strict=True)
-    fuel = [doubt for one in each if (doubt := fuel_doubt(*one))]
+    fuel = [doubt for one in each if (doubt := fuel_finding(*one))]
     heavy = [scale] if scale and scale_by_mass(vehicle) > 1.0 else []
     refuse_too_heavy(vehicle, masses, [*heavy, *fuel])
-    return [d for d in (scale, drag_doubt(vehicle, masses), *fuel) if d is not None]
+    return [d for d in (scale, drag_finding(vehicle, masses), *fuel) if d is not None]
 
 
 def _unmeasured_grade(problem: Problem) -> float:
@@ -217,12 +217,12 @@ def _unmeasured_grade(problem: Problem) -> float:
     return round(float(np.sqrt(np.mean(np.square(left)))), 5)
 
 
-def _told_reference(drives: Sequence[Drive], problem: Problem) -> float | None:
+def _stated_reference(drives: Sequence[Drive], problem: Problem) -> float | None:
     """Return what all drives say that 100 % are [N m]; None where one says nothing, or another."""
-    told = [drive.get("reference_torque") for drive in drives]
+    reported = [drive.get("reference_torque") for drive in drives]
     if not problem.source.needs_reference:
         return None
-    said = [value for signal in told if signal for value, _ in reference_torques(signal)]
+    said = [value for signal in reported if signal for value, _ in reference_torques(signal)]
     if len(said) != len(drives) or max(said) > (1.0 + SAME_REFERENCE) * min(said):
         return None
     return float(np.median(said))
@@ -240,7 +240,7 @@ def _reading_step(drives: Sequence[Drive], problem: Problem) -> float | None:
 def _with_notes(
     vehicle: Vehicle, balances: Sequence[ForceBalance], notes: Sequence[Message]
 ) -> Vehicle:
-    """Note what is doubted of a calibration's drives, and count what is hidden in them."""
+    """Note what is questioned of a calibration's drives, and count what is hidden in them."""
     for note in dict.fromkeys([*_balance_notes(balances), *notes]):
         vehicle = noted(vehicle, note)
     if not any(balance.brake_hidden for balance in balances):
@@ -292,10 +292,10 @@ def unfound_gears(drives: Sequence[Drive], found: int) -> Message | None:
     drives : of the calibration
     found : gearings that stand out from engine over vehicle speed
     """
-    told = [drive.signals["gear"].values for drive in drives if drive.has("gear")]
-    if found < 2 or not told:
+    reported = [drive.signals["gear"].values for drive in drives if drive.has("gear")]
+    if found < 2 or not reported:
         return None
-    gears, counts = np.unique(np.round(np.concatenate(told)), return_counts=True)
+    gears, counts = np.unique(np.round(np.concatenate(reported)), return_counts=True)
     named = int(np.count_nonzero((gears >= 1.0) & (counts >= FEW_IN_GEAR)))
     if named <= found:
         return None

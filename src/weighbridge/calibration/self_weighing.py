@@ -10,9 +10,9 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from weighbridge.balance import ForceBalance, Reason
-from weighbridge.calibration.doubted_motion import gain_std
 from weighbridge.calibration.fitted import rebalanced
 from weighbridge.calibration.problem import Problem
+from weighbridge.calibration.uncertain_motion import gain_std
 from weighbridge.estimators import joint, speed_torque_ekf
 from weighbridge.estimators.considered import fit_consider_std, pinned, triangle
 from weighbridge.estimators.joint.problem import UNMODELLED
@@ -93,7 +93,7 @@ def self_weighed(
 ) -> Vehicle:
     """Scale the torque so that the drives weigh what they are known to.
 
-    The scale pins what the drives weigh in the mean; what is left open moves drives that use the
+    The scale pins what the drives weigh in the mean; what is uncertain moves drives that use the
     torque otherwise.
 
     Parameters
@@ -176,8 +176,8 @@ def self_weighed(
     if vehicle.driveline.stepless:
         between = math.hypot(between, STEPLESS_STD)
     each = math.hypot(TRANSFER_STD[1], between, (factor or UNMODELLED) * best.bound)
-    # Where the torque could not be fitted anew, what its own fit left open stays. The drive that
-    # is weighed differs from others as those of the calibration do.
+    # Where the torque could not be fitted anew, what its own fit leaves uncertain stays. The drive
+    # that is weighed differs from others as those of the calibration do.
     known = math.hypot(
         TRANSFER_STD[0], between, vehicle.provenance.mass_scale_std or 0.0, best.ratio - 1.0
     )

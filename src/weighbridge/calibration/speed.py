@@ -38,7 +38,7 @@ answer was the empty car's mass, RMS error 18 % (studies/galvao.py, seeds from 5
 
 
 POOR: Final = 0.3
-"""Part of the speed's changes below which a fit is doubted [-]: chosen below the 0.46 to 0.71
+"""Part of the speed's changes below which a fit is questioned [-]: chosen below the 0.46 to 0.71
 that simulated country roads reach (studies/galvao.md)."""
 
 

@@ -12,6 +12,7 @@ from dataclasses import replace
 from typing import Final
 
 from weighbridge.checks.clocks import check_overlap, check_pauses, check_rates, check_splices
+from weighbridge.checks.correcting import corrected
 from weighbridge.checks.derived import without_derived
 from weighbridge.checks.digits import with_half_digits
 from weighbridge.checks.engine import (
@@ -23,23 +24,22 @@ from weighbridge.checks.engine import (
 )
 from weighbridge.checks.frozen_imu import check_frozen, check_limit
 from weighbridge.checks.inertial import check_imu
-from weighbridge.checks.mending import mended
 from weighbridge.checks.ranges import check_range, within_ranges, without_strays
+from weighbridge.checks.second_signals import check_reading
 from weighbridge.checks.smoothed_imu import check_smoothed, without_smoothed
 from weighbridge.checks.speed import check_scales
 from weighbridge.checks.spikes import without_spikes
 from weighbridge.checks.travel import check_sign, check_standstill
 from weighbridge.checks.values import check_load, check_pressure, check_retarder, check_stuck
 from weighbridge.checks.vehicle import check_vehicle
-from weighbridge.checks.witnesses import check_reading
 from weighbridge.navigation.along import with_forward_accel
-from weighbridge.navigation.clock_drift import mend_clocks
+from weighbridge.navigation.clock_drift import correct_clocks
 from weighbridge.signals import Drive, Problem
 from weighbridge.signals.held import without_repeats
 from weighbridge.signals.timeline import one_recording, well_formed
 from weighbridge.vehicle.model import Vehicle
 
-__all__ = ["check_drive", "mend_drive", "refuse_serious"]
+__all__ = ["check_drive", "correct_drive", "refuse_serious"]
 
 _Check = Callable[[Drive, "Vehicle | None"], Iterator[Problem]]
 
@@ -66,7 +66,7 @@ _CHECKS: Final[tuple[_Check, ...]] = (
 )
 
 
-def mend_drive(drive: Drive, vehicle: Vehicle | None = None) -> Drive:
+def correct_drive(drive: Drive, vehicle: Vehicle | None = None) -> Drive:
     """Judge a drive, bring its clocks together, and leave out of it what cannot be so.
 
     Clocks come first: what is laid on an even grid later grows with the time from first to last
@@ -98,7 +98,7 @@ def mend_drive(drive: Drive, vehicle: Vehicle | None = None) -> Drive:
     # Before rows are left out: a pause is one of the recording.
     found = (*found, *check_pauses(drive, vehicle))
     if not any(p.serious for p in check_range(drive, vehicle)):
-        drive = without_smoothed(mend_clocks(drive), vehicle)
+        drive = without_smoothed(correct_clocks(drive), vehicle)
     problems = [*drive.problems[len(earlier) :], *found]
     if not any(p.serious for p in problems):
         problems += (
@@ -110,8 +110,8 @@ def mend_drive(drive: Drive, vehicle: Vehicle | None = None) -> Drive:
     clean = replace(within_ranges(drive), problems=(*earlier, *problems))
     if any(p.serious for p in problems):
         return clean
-    clean = with_forward_accel(mended(clean, vehicle))
-    # Last: what froze or dropped out is not held against a witness.
+    clean = with_forward_accel(corrected(clean, vehicle))
+    # Last: what froze or dropped out is not held against a second signal.
     problems = [*clean.problems[len(earlier) :], *check_reading(clean, vehicle)]
     problems.sort(key=lambda p: not p.serious)
     return replace(clean, problems=(*earlier, *problems))
@@ -125,11 +125,11 @@ def refuse_serious(name: str, problems: Iterable[Problem]) -> None:
 
 
 def check_drive(drive: Drive, vehicle: Vehicle | None = None) -> tuple[Problem, ...]:
-    """Look for what cannot be so in a drive; parameters as of `mend_drive`.
+    """Look for what cannot be so in a drive; parameters as of `correct_drive`.
 
     Returns
     -------
     What was found, serious problems first. The drive's own ``problems`` (from
     reading it) are not repeated.
     """
-    return mend_drive(drive, vehicle).problems[len(drive.problems) :]
+    return correct_drive(drive, vehicle).problems[len(drive.problems) :]

@@ -106,7 +106,7 @@ def check_overlap(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
 
 
 def check_pauses(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
-    """Tell of times in which nothing was recorded, which a clock set forward looks like, too."""
+    """Report times in which nothing was recorded, which a clock set forward looks like, too."""
     clocks: dict[str, dict[int, Floats]] = {}
     for s in drive.signals.values():
         clocks.setdefault(QUANTITIES[s.name].table, {})[id(s.time)] = s.time
@@ -155,7 +155,7 @@ def check_pauses(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
 
 
 def check_splices(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
-    """Tell of recordings that were put one behind another on one clock."""
+    """Report recordings that were put one behind another on one clock."""
     if found := find_splices(drive):
         times = phrase("times_first", count=len(found)) if len(found) > 1 else "once,"
         yield Problem.of(

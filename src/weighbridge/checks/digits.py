@@ -15,8 +15,8 @@ COARSEST: Final = 0.22
 0.5 m/s^2 made a mass 81 % heavy; 8 bits of 2 g are 0.15 m/s^2."""
 
 COARSEST_CUT: Final = 0.12
-"""Steps up to which half a digit mends what was cut off [m/s^2]: it leaves 0.3 to 0.6 % of the mass
-at 0.1 m/s^2, 2 to 4 % at 0.2 m/s^2. Unmended, 0.1 m/s^2 made masses 11 to 15 % heavy."""
+"""Steps up to which half a digit corrects what was cut off [m/s^2]: it leaves 0.3 to 0.6 % of the
+mass at 0.1 m/s^2, 2 to 4 % at 0.2 m/s^2. Uncorrected, 0.1 m/s^2 made masses 11 to 15 % heavy."""
 
 TWICE: Final = 1.6
 """Samples at zero over the mean of both neighbours from which its step is twice as wide [-]: 1.8 to

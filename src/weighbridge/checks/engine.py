@@ -36,7 +36,7 @@ _AGAINST: Final = -0.5
 
 
 def check_whole_torque(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
-    """Doubt a torque in N m that looks like one in percent."""
+    """Question a torque in N m that looks like one in percent."""
     s = drive.get("engine_torque")
     if s is None or len(s) < 200:
         return

@@ -18,7 +18,7 @@ SHORTEST: Final[dict[str, float]] = {"engine_speed": 10.0, "vehicle_speed": 20.0
 
 SHORTEST_TORQUE: Final = 20.0
 """The same of torque, load and air flow [s]: cruise control on the level holds a rounded load
-so long, and loaded trucks climb at full load for minutes, which is told by the rest."""
+so long, and loaded trucks climb at full load for minutes, which is shown by the rest."""
 
 HELD: Final = 8.0
 """Shorter runs of torque, load and air flow count from here on [s] where there are"""

@@ -15,7 +15,7 @@ from weighbridge.signals.catalogue import IMU_SIGNALS
 from weighbridge.signals.instants import instant
 from weighbridge.vehicle.model import Vehicle
 
-_TOLD: Final = 5.0
+_REPORTED: Final = 5.0
 """Frozen for less in all is left out without a word [s]."""
 
 _AT_LIMIT: Final = 0.05
@@ -37,14 +37,14 @@ def check_frozen(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
         if s is None or len(s) < 50 or s.duration < 20.0 or not np.any(s.values != s.values[0]):
             continue
         stretches = frozen_stretches(s, speed)
-        if float(np.sum(stretches[:, 1] - stretches[:, 0])) >= _TOLD:
+        if float(np.sum(stretches[:, 1] - stretches[:, 0])) >= _REPORTED:
             alike.setdefault(np.round(stretches).tobytes(), []).append(name)
     for names in alike.values():
-        yield _told(names, drive.signals[names[0]], speed)
+        yield _reported(names, drive.signals[names[0]], speed)
 
 
-def _told(names: list[str], axis: Signal, speed: Signal | None) -> Problem:
-    """Tell of axes that froze together, such as ``axis``."""
+def _reported(names: list[str], axis: Signal, speed: Signal | None) -> Problem:
+    """Report axes that froze together, such as ``axis``."""
     stretches = frozen_stretches(axis, speed)
     lengths = stretches[:, 1] - stretches[:, 0]
     total = float(lengths.sum())

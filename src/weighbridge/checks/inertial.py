@@ -17,7 +17,7 @@ from weighbridge.checks import windows
 from weighbridge.constants import GRAVITY
 from weighbridge.messages import phrase
 from weighbridge.navigation.dropouts import rare_spikes
-from weighbridge.navigation.frozen import thawed
+from weighbridge.navigation.frozen import without_frozen
 from weighbridge.signals import Bools, Drive, Floats, Problem, Signal
 from weighbridge.signals.catalogue import IMU_SIGNALS
 from weighbridge.signals.instants import span
@@ -54,11 +54,11 @@ _PART: Final = 300.0
 
 def check_imu(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
     """Compare the inertial sensor with gravity, with the course and with itself."""
-    drive = _without_spikes(thawed(drive, IMU_SIGNALS))
+    drive = _without_spikes(without_frozen(drive, IMU_SIGNALS))
     accel = _axes(drive, "accel")
     gyro = _axes(drive, "gyro")
     if gyro is not None and not any(np.ptp(s.values) > 0.0 for s in gyro):
-        gyro = None  # It is stuck, and told so.
+        gyro = None  # It is stuck, and reported so.
     fine = True
     if accel is not None:
         for problem in _check_gravity(accel):

@@ -1,4 +1,4 @@
-"""Values that no road vehicle can have are left out of use, not only told."""
+"""Values that no road vehicle can have are left out of use, not only reported."""
 
 from __future__ import annotations
 
@@ -14,7 +14,8 @@ from weighbridge.signals.instants import instant
 from weighbridge.vehicle.model import Vehicle
 
 FEW: Final = 0.01
-"""Part of the values outside their range from which the unit is doubted, and the mass withheld."""
+"""Part of the values outside their range from which the unit is uncertain, and the mass
+withheld."""
 
 # Times the range's larger bound: no unit under another's name is so far off (units differ by 3600
 # at most), and squares and cubes of what is left cannot overflow.

@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from weighbridge.constants import SAMPLES_AT_ONCE
-from weighbridge.navigation.frozen import thawed
+from weighbridge.navigation.frozen import without_frozen
 from weighbridge.signals import Drive, Floats, Problem, Signal
 from weighbridge.signals.catalogue import IMU_SIGNALS
 from weighbridge.signals.instants import span
@@ -46,7 +46,7 @@ def without_smoothed(drive: Drive, vehicle: Vehicle | None = None) -> Drive:
 
     Parameters
     ----------
-    drive, vehicle : as of `weighbridge.checks.mend_drive`
+    drive, vehicle : as of `weighbridge.checks.correct_drive`
     """
     heights = drive.has("altitude") or drive.has("grade")
     trusted = set(IMU_SIGNALS) & set(drive.info.trusted)
@@ -63,7 +63,7 @@ def without_smoothed(drive: Drive, vehicle: Vehicle | None = None) -> Drive:
 def check_smoothed(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
     """Find an accelerometer whose shaking was filtered away, and quick changes with it."""
     speed = drive.speed
-    drive = thawed(drive, IMU_SIGNALS[:3])
+    drive = without_frozen(drive, IMU_SIGNALS[:3])
     axes = [s for name in IMU_SIGNALS[:3] if (s := drive.get(name)) is not None and len(s) > 1]
     if speed is None or len(speed) < 2 or len(axes) < len(IMU_SIGNALS[:3]):
         return

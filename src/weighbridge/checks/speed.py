@@ -94,7 +94,7 @@ def check_scales(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
 
 
 def _check_alone(drive: Drive, speed: Signal, vehicle: Vehicle | None) -> Iterator[Problem]:
-    """Doubt a speed that nothing else of the drive can be compared with."""
+    """Question a speed that nothing else of the drive can be compared with."""
     why = _beyond_belief(drive, speed, vehicle)
     if why and (jumps := find_splices(drive)):
         yield Problem.of(

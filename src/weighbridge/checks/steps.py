@@ -44,7 +44,7 @@ IN_A_ROW: Final = 2
 
 MATTERS: Final = 0.03
 """A factor farther from one moves a mass by more than weighing is worth [-]: there is no mass
-then, unless a witness of the torque agrees with the reading."""
+then, unless a second signal of the torque agrees with the reading."""
 
 POUND_FOOT: Final = 1.35581795
 """A pound-foot [N m]."""
@@ -67,7 +67,7 @@ def check_steps(
     Parameters
     ----------
     drive, vehicle
-    witnesses : what the witnesses of the torque say of the reading
+    witnesses : what the second signals of the torque say of the reading
     """
     known = None if vehicle is None else vehicle.torque.reading_step
     if vehicle is None or known is None:
@@ -107,7 +107,7 @@ def check_steps(
 
 
 def _cleared(ratio: float, witnesses: Sequence[Finding]) -> bool:
-    """Say whether a witness has the reading nearer to what it was than to so much of it."""
+    """Say whether a second signal has the reading nearer to what it was than to so much of it."""
     return any(
         f.verdict == "agrees" and abs(f.scale - 1.0) < abs(f.scale - ratio) for f in witnesses
     )

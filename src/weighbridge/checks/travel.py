@@ -36,7 +36,7 @@ STEADY: Final = 0.08
 
 
 def check_standstill(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
-    """Tell of long standstills and cuts, which spoil no mass, and of a speed of two sources."""
+    """Report long standstills and cuts, which spoil no mass, and a speed of two sources."""
     s = drive.speed
     if s is None or len(s) < 2:
         return

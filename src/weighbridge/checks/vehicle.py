@@ -49,18 +49,18 @@ def _check_reference(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]
     reported = reference_torques(reference)
     model = TorqueModel() if vehicle is None else vehicle.torque
     if len(reported) < 2:
-        told, known = reported[0][0] if reported else None, model.told_reference_torque
-        if told and known and abs(told / known - 1.0) > SAME_REFERENCE:
+        noted, known = reported[0][0] if reported else None, model.told_reference_torque
+        if noted and known and abs(noted / known - 1.0) > SAME_REFERENCE:
             yield Problem.of(
                 "torque.reference_changed",
                 reference.name,
                 serious=model.of_source.needs_reference,
-                now=told,
+                now=noted,
                 known=known,
             )
         stated = model.reference_torque if known is None else None
-        if told and stated and abs(told / stated - 1.0) > SAME_REFERENCE:
-            yield Problem.of("torque.reference_file", reference.name, now=told, stated=stated)
+        if noted and stated and abs(noted / stated - 1.0) > SAME_REFERENCE:
+            yield Problem.of("torque.reference_file", reference.name, now=noted, stated=stated)
         return
     values = np.array([value for value, _ in reported])
     nearest = np.argmin(np.abs(reference.values[:, None] - values[None, :]), axis=1)

@@ -132,7 +132,7 @@ def calibrate(
     Example: weighbridge calibrate drive-empty/ --mass 1580 -o car.toml
     """
     from weighbridge.arguments import check_choice
-    from weighbridge.calibration.doubted_masses import with_doubts
+    from weighbridge.calibration.questionable_masses import with_findings
     from weighbridge.calibration.settings import CalibrationSettings
     from weighbridge.pipeline.given import dbcs_beside, mapping_beside
     from weighbridge.vehicle.model import Vehicle
@@ -162,7 +162,7 @@ def calibrate(
         recorded = [drive for held in parts for drive in held]
         masses = masses_of_parts(parts, mass)
         for held in (h for h in parts if len(h) > 1):
-            notice(f"  note: {_told_parts(held)}")
+            notice(f"  note: {_stated_parts(held)}")
         bar.total = len(drives) * _READING + len(recorded) * (_FITTING + 1.0)
         bar.begin(f"fitting {_counted(len(recorded))}", len(recorded) * _FITTING)
         car, found, notes = _fitted(recorded, masses, base, settings, tare, bar.within)
@@ -177,7 +177,7 @@ def calibrate(
             own = own_masses(car, recorded, bar.within)
             notes += own.lines
             if own.doubt is not None:
-                car = with_doubts(car, (*car.provenance.problems, own.doubt))
+                car = with_findings(car, (*car.provenance.problems, own.doubt))
         car.save(output)
     console().print(found)
     for line in notes:
@@ -219,7 +219,7 @@ def _counted(drives: int) -> str:
 
 def _with_tare(car: Vehicle, tare: float, lightest: float) -> Vehicle:
     """Return a vehicle with its mass without payload, checked by the lightest known mass [kg]."""
-    from weighbridge.calibration.doubted_masses import tared
+    from weighbridge.calibration.questionable_masses import tared
     from weighbridge.errors import ConfigError
 
     if not 0.3 * lightest <= tare <= 1.02 * lightest:
@@ -257,14 +257,14 @@ def masses_of_parts(
         return list(masses)
     if len(masses) == len(parts):
         return [kg for kg, held in zip(masses, parts, strict=True) for _ in held]
-    several = "; ".join(_told_parts(held) for held in parts if len(held) > 1)
+    several = "; ".join(_stated_parts(held) for held in parts if len(held) > 1)
     raise ConfigError(
         f"{len(masses)} masses for {drives} drives in {len(parts)} recording(s): give --mass "
         f"once, or once for each{'; ' + several if several else ''}"
     )
 
 
-def _told_parts(held: Sequence[Drive]) -> str:
+def _stated_parts(held: Sequence[Drive]) -> str:
     """Say which drives a recording holds, in the order their masses are given."""
     from weighbridge.signals.instants import span
 

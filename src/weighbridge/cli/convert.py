@@ -71,7 +71,7 @@ def convert(
     recorded = load(drive, mapping, dbc)
     serious = next((p for p in recorded.problems if p.serious), None)
     if serious is not None:
-        # A canonical drive carries no doubts: a mass would be made of it without a word.
+        # A canonical drive carries no questions: a mass would be made of it without a word.
         raise DriveError(f"{drive}: not converted, {serious.text}")
     if whole:
         from weighbridge.io import write_mdf

@@ -79,7 +79,7 @@ def _cache_text(cache: KernelCache) -> str:
 def _lacking(extra: Extra) -> str:
     """Say what keeps an extra from working."""
     missing = [package.name for package in extra.packages if package.installed is None]
-    others = [p.told for p in extra.packages if p.installed is not None and not p.fits]
+    others = [p.reported for p in extra.packages if p.installed is not None and not p.fits]
     return "; ".join([*([f"missing: {', '.join(missing)}"] if missing else []), *others])
 
 

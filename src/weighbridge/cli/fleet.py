@@ -196,19 +196,23 @@ def status(
 
     folder = brought(results)
     opened = Results.opened(folder)
-    told = opened.told()
+    progress = opened.read_progress()
     if opened.running:
-        left = told.get("left_s")
-        of = f" of {told.get('found', '?')}" + ("" if told.get("complete") else " found so far")
+        left = progress.get("left_s")
+        of = f" of {progress.get('found', '?')}" + (
+            "" if progress.get("complete") else " found so far"
+        )
         rest = "" if left is None else f", {time_text(left)} left"
-        rate = told.get("rate_per_s", 0)
-        say(f"running: {told.get('done', 0)}{of} recordings, {rate:.1f}/s{rest}")
-        if told.get("workers") == 0:
+        rate = progress.get("rate_per_s", 0)
+        say(f"running: {progress.get('done', 0)}{of} recordings, {rate:.1f}/s{rest}")
+        if progress.get("workers") == 0:
             say(f"  {_NO_WORKER}")
-    elif told and not (told.get("complete") and told.get("done") == told.get("found")):
+    elif progress and not (
+        progress.get("complete") and progress.get("done") == progress.get("found")
+    ):
         say(
-            f"stopped after {told.get('done', 0)} of {told.get('found', '?')} recordings: give the "
-            "same command again to go on"
+            f"stopped after {progress.get('done', 0)} of {progress.get('found', '?')} recordings: "
+            "give the same command again to go on"
         )
     else:
         say("no run is under way")
@@ -288,14 +292,14 @@ def _say_learnt(results: Path, learn: Path) -> None:
 
 def _lonely() -> Callable[[Count], None]:
     """Return what says once that no worker is there to do the work."""
-    told, since = False, time.monotonic()
+    reported, since = False, time.monotonic()
 
     def tell(count: Count) -> None:
-        nonlocal told, since
+        nonlocal reported, since
         if count.workers != 0:
             since = time.monotonic()
-        elif not told and time.monotonic() - since > _PATIENCE:
-            told = True
+        elif not reported and time.monotonic() - since > _PATIENCE:
+            reported = True
             complain(f"weighbridge: {_NO_WORKER}")
 
     return tell
@@ -303,16 +307,16 @@ def _lonely() -> Callable[[Count], None]:
 
 @contextmanager
 def _progress() -> Iterator[Callable[[Count], None]]:
-    """Show a bar with rate and time left on a terminal; in a pipe, what must be told alone."""
+    """Show a bar with rate and time left on a terminal; in a pipe, what must be reported alone."""
     lonely = _lonely()
     if not watched():
         yield lonely
         return
     from rich.progress import BarColumn, Progress, TextColumn
 
-    columns = (TextColumn("weighing"), BarColumn(), TextColumn("{task.fields[told]}"))
+    columns = (TextColumn("weighing"), BarColumn(), TextColumn("{task.fields[text]}"))
     with Progress(*columns, console=console(stderr=True), transient=True) as bar:
-        task = bar.add_task("weighing", total=None, told="")
+        task = bar.add_task("weighing", total=None, text="")
 
         def tell(count: Count) -> None:
             lonely(count)
@@ -323,7 +327,7 @@ def _progress() -> Iterator[Callable[[Count], None]]:
                 task,
                 total=count.found if count.complete else None,
                 completed=count.done,
-                told=shown(f"{count.done}/{of}, {count.rate:.1f}/s{left}{bad}"),
+                text=shown(f"{count.done}/{of}, {count.rate:.1f}/s{left}{bad}"),
             )
 
         try:

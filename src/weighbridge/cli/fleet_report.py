@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from weighbridge.fleet.reporting import FleetReport
 
-_TOLD: Final = 10  # legs in the answer, and vehicles of what was learnt
+_REPORTED: Final = 10  # legs in the answer, and vehicles of what was learnt
 
 _Couplings = Annotated[
     Optional[Path],  # noqa: UP045
@@ -109,7 +109,7 @@ def report(
 
 
 def _say_answer(found: FleetReport, alarm: float) -> None:
-    """Tell who was overloaded, surest first; ``alarm`` is the probability that is sure."""
+    """Say who was overloaded, surest first; ``alarm`` is the probability that is sure."""
     from weighbridge.fleet.page import how_sure
 
     t = found.totals
@@ -117,21 +117,21 @@ def _say_answer(found: FleetReport, alarm: float) -> None:
     say_without_file(found.without_file, t["vehicles"])
     sure = "1 leg" if t["alarms"] == 1 else f"{t['alarms']} legs"
     say(f"overloaded: {sure} at least {100 * alarm:g} % sure, {t['warnings']} likely")
-    for row in found.overloads.head(_TOLD).iter_rows(named=True):
+    for row in found.overloads.head(_REPORTED).iter_rows(named=True):
         when = "no time" if row["start"] is None else f"{row['start']:%Y-%m-%d %H:%M} UTC"
         say(
             f"  {row['vehicle_id']} {when}: {row['mass_kg']:.0f} ± "
             f"{row['high95_kg'] - row['mass_kg']:.0f} kg of {row['permitted_kg']:.0f} kg, "
             f"{how_sure(row['overload'])}"
         )
-    more = found.overloads.height - _TOLD
+    more = found.overloads.height - _REPORTED
     if more > 0:
         say(f"  and {more} more, surest first: -o fleet.html has all")
     say_unjudged(found.unjudged, t["legs"], "leg")
 
 
 def say_unjudged(causes: pl.DataFrame, of: int, word: str) -> None:
-    """Tell what was not judged, ranked by what it prevents and how often.
+    """Say what was not judged, ranked by what it prevents and how often.
 
     Parameters
     ----------
@@ -144,16 +144,16 @@ def say_unjudged(causes: pl.DataFrame, of: int, word: str) -> None:
     if causes.is_empty():
         return
     say(f"not judged: {causes['count'].sum()} of {of} {word}s, by what is not known")
-    for row in causes.head(_TOLD).iter_rows(named=True):
+    for row in causes.head(_REPORTED).iter_rows(named=True):
         count = f"{row['count']} {word}{'' if row['count'] == 1 else 's'}"
         say(f"  {row['prevents']}, {count} of {some(row['vehicles'])}: {row['example']}")
-    more = causes.height - _TOLD
+    more = causes.height - _REPORTED
     if more > 0:
         say(f"  and {more} more causes: weighbridge fleet report -o fleet.html has all")
 
 
 def say_without_file(without: list[str | None], vehicles: int) -> None:
-    """Tell how many vehicles have no file, and the first of them."""
+    """Say how many vehicles have no file, and the first of them."""
     from weighbridge.fleet.names import some
 
     if without:
@@ -164,27 +164,27 @@ def say_without_file(without: list[str | None], vehicles: int) -> None:
 
 
 def _say_outside(outside: pl.DataFrame) -> None:
-    """Tell how many known masses lie outside the interval that was told, and which is the worst."""
+    """Say how many known masses lie outside their interval, and which is the worst."""
     if outside.is_empty():
         return
     known, out = int(outside["known"].sum()), int(outside["outside"].sum())
     of = "1 known mass" if known == 1 else f"{known} known masses"
     say(f"outside the 95 % interval: {out} of {of}; by chance one in twenty is")
-    doubted = outside.filter(outside["outside"] > 0)
-    for row in doubted.head(_TOLD).iter_rows(named=True):
+    questionable = outside.filter(outside["outside"] > 0)
+    for row in questionable.head(_REPORTED).iter_rows(named=True):
         when = "" if row["worst_start"] is None else f" {row['worst_start']:%Y-%m-%d %H:%M} UTC"
         say(
             f"  {row['vehicle_id']}: {row['outside']} of {row['known']}, worst{when}: known "
             f"{row['worst_known_kg']:.0f} kg, 95 % interval {row['worst_low95_kg']:.0f} to "
             f"{row['worst_high95_kg']:.0f} kg ({100.0 * row['worst_error']:+.1f} %)"
         )
-    more = doubted.height - _TOLD
+    more = questionable.height - _REPORTED
     if more > 0:
         say(f"  and {more} more: -o fleet.html has all")
 
 
 def _say_learnt(learnt: pl.DataFrame) -> None:
-    """Tell vehicles whose drives of known mass contradict their file, or that drift."""
+    """Report vehicles whose drives of known mass contradict their file, or that drift."""
     if learnt.is_empty():
         return
     of = "1 vehicle" if learnt.height == 1 else f"{learnt.height} vehicles"
@@ -194,9 +194,9 @@ def _say_learnt(learnt: pl.DataFrame) -> None:
         f"{'its' if contradicted == 1 else 'their'} drives, "
         f"{drifts} {'drifts' if drifts == 1 else 'drift'}"
     )
-    doubted = learnt.filter(learnt["contradicted"] | learnt["drifts"])
-    for row in doubted.head(_TOLD).iter_rows(named=True):
+    questionable = learnt.filter(learnt["contradicted"] | learnt["drifts"])
+    for row in questionable.head(_REPORTED).iter_rows(named=True):
         say(f"  {row['vehicle_id']}: {row['told']}")
-    more = doubted.height - _TOLD
+    more = questionable.height - _REPORTED
     if more > 0:
         say(f"  and {more} more: -o fleet.html has all")

@@ -114,7 +114,7 @@ def _weighable(found: Inspection) -> bool:
 def _next(found: Inspection, path: Path, parts: int, given: _Given) -> list[str]:
     """Say what to type next, by whether the vehicle file weighs or has to be calibrated first."""
     from weighbridge.vehicle.data_sheet import by_data_sheet
-    from weighbridge.vehicle.telling import can_weigh
+    from weighbridge.vehicle.description import can_weigh
 
     if any(p.serious for p in found.problems):
         return ["next: settle what is serious above, then inspect again"]
@@ -191,12 +191,12 @@ def _other_torque(found: Inspection, car: Vehicle) -> str:
     """Say that a drive has its torque in another way than the vehicle file weighs by."""
     from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
 
-    told, asked = TORQUE_SOURCES[found.ways[0].torque], car.torque.of_source
-    remedy = f"make a vehicle file of it: calibrate --torque {told.name}"
-    if told.signed:
-        remedy += f", or vehicle new --torque {told.name}"
+    reported, asked = TORQUE_SOURCES[found.ways[0].torque], car.torque.of_source
+    remedy = f"make a vehicle file of it: calibrate --torque {reported.name}"
+    if reported.signed:
+        remedy += f", or vehicle new --torque {reported.name}"
     return (
-        f"next: the vehicle file weighs by {asked.title}, and the drive holds {told.title}; "
+        f"next: the vehicle file weighs by {asked.title}, and the drive holds {reported.title}; "
         f"{remedy}"
     )
 
@@ -263,8 +263,8 @@ def _signal_table(found: Inspection, width: int) -> Table:
             f"{s.high:.5g}",
             f"{s.step:.3g}" if s.step is not None else "fine",
         )
-        told = dict(zip(columns, cells, strict=True))
-        table.add_row(s.name, *(told[c] for c in kept), s.unit)
+        reported = dict(zip(columns, cells, strict=True))
+        table.add_row(s.name, *(reported[c] for c in kept), s.unit)
     return table
 
 

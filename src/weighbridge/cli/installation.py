@@ -63,7 +63,7 @@ class Package:
         )
 
     @property
-    def told(self) -> str:
+    def reported(self) -> str:
         """What is wrong with it, in a few words; empty where nothing is."""
         if self.fits:
             return ""
@@ -127,14 +127,14 @@ class Installation:
     def amiss(self) -> list[str]:
         """What keeps the program from working as it should, each with its remedy."""
         found = [
-            f'{package.told}: pip install "{package.name}{package.wanted}"'
+            f'{package.reported}: pip install "{package.name}{package.wanted}"'
             for package in self.packages
             if not package.fits
         ]
         if self.wanted_python and not SpecifierSet(self.wanted_python).contains(self.python):
             found.append(f"Python {self.python} does not fit {self.wanted_python}: use another")
         unfit = {
-            package.name: f'{package.told}: pip install "{package.name}{package.wanted}"'
+            package.name: f'{package.reported}: pip install "{package.name}{package.wanted}"'
             for extra in self.extras
             for package in extra.packages
             if package.installed is not None and not package.fits

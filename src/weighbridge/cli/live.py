@@ -468,7 +468,7 @@ def _calibrate(scale: LiveScale, ticket: float, car: Vehicle, out: Path) -> None
 
     found = calibrated_by_ticket(scale.recorded(), ticket, car)
     if found.vehicle is None:
-        complain(f"{out} is not written: {found.told}")
+        complain(f"{out} is not written: {found.reported}")
         return
     found.vehicle.save(out)
-    complain(f"written: {out}; {found.told}")
+    complain(f"written: {out}; {found.reported}")

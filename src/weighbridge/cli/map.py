@@ -127,7 +127,7 @@ def map_log(
 
 
 def _tell_lacking(drafts: list[Draft], refused: dict[Path, str]) -> None:
-    """Tell files that were left out, and what no column was taken for."""
+    """Report files that were left out, and what no column was taken for."""
     from weighbridge.io.draft import tells_torque
     from weighbridge.io.draft_missing import missing
 
@@ -164,8 +164,8 @@ def _again(logs: list[Path], columns: str | None, dbc: list[str], output: Path |
 
 def _to_ask(drafts: list[Draft], again: list[str]) -> str:
     """Say how to be asked, to a person at a terminal and where something is uncertain."""
-    doubtful = any(found.all_doubts for found in drafts)
-    if not (doubtful and sys.stdin.isatty() and sys.stdout.isatty()):
+    questionable = any(found.all_questions for found in drafts)
+    if not (questionable and sys.stdin.isatty() and sys.stdout.isatty()):
         return ""
     return f"or, to be asked about uncertain findings: {shlex.join([*again, '--ask'])}"
 
@@ -316,7 +316,7 @@ def _rated(found: Draft, rate: float) -> Draft:
     counted = [time for time in found.times if time.row_rate is not None]
     if not counted:
         return found
-    return timed(found, replace(counted[0], row_rate=rate, doubts=[]))
+    return timed(found, replace(counted[0], row_rate=rate, questions=[]))
 
 
 def _drive(logs: list[Path]) -> Path:
@@ -355,13 +355,13 @@ def _show(found: Draft, screen: Console) -> None:
         rate = f"{column.rate:.3g}" if column.rate > 0.0 else "-"
         table.add_row(shown(column.name), column.quantity, unit, *values, str(column.count), rate)
     screen.print(table)
-    others = [c.name for c in found.columns if not c.quantity and not c.doubt]
+    others = [c.name for c in found.columns if not c.quantity and not c.question]
     if others:
         more = f" and {len(others) - _SHOWN} more" if len(others) > _SHOWN else ""
         names = ", ".join(shown(n) for n in others[:_SHOWN])
         screen.print(f"  not taken: {names}{more}", highlight=False)
-    for doubt in found.all_doubts:
-        screen.print(f"  uncertain: {shown(doubt)}", highlight=False)
+    for question in found.all_questions:
+        screen.print(f"  uncertain: {shown(question)}", highlight=False)
 
 
 def _length(found: Draft) -> str:

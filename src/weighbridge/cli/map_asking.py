@@ -26,7 +26,7 @@ def asked(found: Draft, *, torque: bool = True) -> Draft:
 
     Where no column is known by its name, or none of the log shows a torque, each is asked about.
 
-    Where nobody answers, what was drafted stays, with its doubts.
+    Where nobody answers, what was drafted stays, with its questions.
 
     Parameters
     ----------
@@ -73,23 +73,23 @@ def _in_unit(time: DraftTime, unit: str) -> DraftTime:
     from weighbridge.signals.units import UNITS
 
     seconds = time.seconds * (UNITS[unit].factor / UNITS[time.unit].factor)
-    return replace(time, unit=unit, seconds=seconds, doubts=[], guessed=False)
+    return replace(time, unit=unit, seconds=seconds, questions=[], guessed=False)
 
 
 def _asked_rate(time: DraftTime) -> DraftTime:
     what = f"{shown(time.column)} counts rows" if time.column else "no column is a time"
     while True:
-        told = _prompt(f"{what}; how many rows per second (0 if you do not know)", "0")
+        reported = _prompt(f"{what}; how many rows per second (0 if you do not know)", "0")
         try:
-            rate = float(told.replace(",", "."))
+            rate = float(reported.replace(",", "."))
         except ValueError:
-            complain(f"{told!r} is no number")
+            complain(f"{reported!r} is no number")
             continue
         if rate == 0.0:
             return time
         if 0.0 < rate < float("inf"):
-            return replace(time, row_rate=rate, doubts=[])
-        complain(f"{told!r} is no rate")
+            return replace(time, row_rate=rate, questions=[])
+        complain(f"{reported!r} is no rate")
 
 
 def _asked_meaning(column: DraftColumn, taken: set[str]) -> DraftColumn:
@@ -98,15 +98,15 @@ def _asked_meaning(column: DraftColumn, taken: set[str]) -> DraftColumn:
 
     if column.quantity or not column.count:
         return column
-    told = _answer(
+    reported = _answer(
         f"{shown(column.name)}, {column.low:.4g} to {column.high:.4g}; what is it (a quantity of "
         f"docs/files.md such as vehicle_speed, or {_NONE})",
         [*(q for q in QUANTITIES if q not in taken), _NONE],
         _NONE,
     )
-    if told == _NONE:
+    if reported == _NONE:
         return column
-    return replace(column, quantity=told, unit=QUANTITIES[told].suffix, doubt="")
+    return replace(column, quantity=reported, unit=QUANTITIES[reported].suffix, question="")
 
 
 def _asked_quantity(column: DraftColumn, taken: set[str]) -> DraftColumn:
@@ -117,22 +117,22 @@ def _asked_quantity(column: DraftColumn, taken: set[str]) -> DraftColumn:
     if not column.quantity or not column.unsure:
         return column
     free = [q for q in QUANTITIES if q not in taken]
-    why = f" ({shown(column.doubt)})" if column.doubt else ""
-    told = _answer(
+    why = f" ({shown(column.question)})" if column.question else ""
+    reported = _answer(
         f"{shown(column.name)}, {column.low:.4g} to {column.high:.4g} {column.unit}, is taken for "
         f"{column.quantity}{why}; what is it (a quantity of docs/files.md, or {_NONE})",
         [*free, _NONE],
         column.quantity,
     )
-    if told == _NONE:
-        return replace(column, quantity="", doubt="")
-    if told == column.quantity:
+    if reported == _NONE:
+        return replace(column, quantity="", question="")
+    if reported == column.quantity:
         # The unit is another question.
-        return replace(column, unsure=False, doubt="" if column.stated else column.doubt)
-    allowed = suffixes_of(QUANTITIES[told])
-    unit = column.unit if column.unit in allowed else QUANTITIES[told].suffix
+        return replace(column, unsure=False, question="" if column.stated else column.question)
+    allowed = suffixes_of(QUANTITIES[reported])
+    unit = column.unit if column.unit in allowed else QUANTITIES[reported].suffix
     stated = column.stated and column.unit in allowed
-    return replace(column, quantity=told, unit=unit, stated=stated, doubt="", unsure=False)
+    return replace(column, quantity=reported, unit=unit, stated=stated, question="", unsure=False)
 
 
 def _asked_unit(column: DraftColumn) -> DraftColumn:
@@ -143,15 +143,15 @@ def _asked_unit(column: DraftColumn) -> DraftColumn:
     if not column.quantity or column.stated or not column.unit:
         return column
     allowed = suffixes_of(QUANTITIES[column.quantity])
-    told = _answer(
+    reported = _answer(
         f"{shown(column.name)} is {column.quantity}, {column.low:.4g} to {column.high:.4g};"
         f" unit ({_listed(allowed)}, or {_NONE} to leave it out)",
         [*allowed, _NONE],
         column.unit,
     )
-    if told == _NONE:
-        return replace(column, quantity="", doubt="")
-    return replace(column, unit=told, stated=True, doubt="")
+    if reported == _NONE:
+        return replace(column, quantity="", question="")
+    return replace(column, unit=reported, stated=True, question="")
 
 
 def _listed(words: Sequence[str]) -> str:
@@ -161,11 +161,11 @@ def _listed(words: Sequence[str]) -> str:
 def _answer(question: str, allowed: Sequence[str], usual: str) -> str:
     """Ask until the answer is one of those allowed."""
     while True:
-        told = _prompt(question, usual)
-        if told in allowed:
-            return told
-        near = difflib.get_close_matches(told, allowed, n=1)
-        complain(f"{told!r} is none of them" + (f"; did you mean {near[0]!r}?" if near else ""))
+        reported = _prompt(question, usual)
+        if reported in allowed:
+            return reported
+        near = difflib.get_close_matches(reported, allowed, n=1)
+        complain(f"{reported!r} is none of them" + (f"; did you mean {near[0]!r}?" if near else ""))
 
 
 def _prompt(question: str, usual: str) -> str:

@@ -81,7 +81,7 @@ def own_masses(
     ----------
     car : as calibrated
     drives : of the calibration, in its order
-    progress : told of drives weighed of all
+    progress : reported of drives weighed of all
     """
     from weighbridge.errors import WeighbridgeError
     from weighbridge.pipeline.weighing import DEFAULT_METHOD, weigh
@@ -115,8 +115,8 @@ def own_masses(
 
 def _words(own: Weighing, known: float) -> str:
     """Say what a drive weighs, and the loads that it seems to have had."""
-    told = f"{own.mass:.0f} kg in place of {known:.0f} kg"
+    reported = f"{own.mass:.0f} kg in place of {known:.0f} kg"
     if not own.load_changed:
-        return told
+        return reported
     loads = ", ".join(f"{part.mass:.0f}" for part in own.segments)
-    return f"{told}; its load seems to change: {loads} kg in turn"
+    return f"{reported}; its load seems to change: {loads} kg in turn"

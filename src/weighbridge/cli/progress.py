@@ -30,7 +30,7 @@ class Bar:
         self.done = 0.0
         self._before = self._share = 0.0
         self._clock = clock
-        self._begun = self._told = clock()
+        self._begun = self._reported = clock()
         self._what = ""
         self._progress: Progress | None = None
 
@@ -62,12 +62,12 @@ class Bar:
         """Time that the rest takes at the mean speed so far [s]; None before the first step."""
         if not self.done or not self.total:
             return None
-        rest = (self.total - self.done) * (self._told - self._begun) / self.done
-        return max(rest - (self._clock() - self._told), 0.0)
+        rest = (self.total - self.done) * (self._reported - self._begun) / self.done
+        return max(rest - (self._clock() - self._reported), 0.0)
 
     def _advance(self, done: float) -> None:
         if done > self.done:
-            self.done, self._told = done, self._clock()
+            self.done, self._reported = done, self._clock()
         if self._progress is not None:
             self._progress.update(
                 self._progress.task_ids[0], completed=self.done, total=self.total or None

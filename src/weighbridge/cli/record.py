@@ -39,7 +39,7 @@ _WAIT: Final = 0.25
 _LEAST_CHECK: Final = 3.0
 """So long signals are looked at for their rate, also where all have come [s]."""
 
-_TOLD: Final = 60.0
+_REPORTED: Final = 60.0
 """Without a terminal a line comes so often [s]."""
 
 
@@ -184,7 +184,7 @@ def run(feed: Feed, recorder: Recorder | Recordings, ended: Callable[[], bool]) 
     from weighbridge.live.arrival import Arrivals
 
     arrivals = Arrivals()
-    begun = told = monotonic()
+    begun = reported = monotonic()
     screen = console(stderr=True)
     try:
         with screen.status("recording") if watched() else contextlib.nullcontext() as line:
@@ -195,16 +195,16 @@ def run(feed: Feed, recorder: Recorder | Recordings, ended: Callable[[], bool]) 
                 recorder.tick()
                 arrivals.add(blocks)
                 if line is not None:
-                    line.update(_told(feed, arrivals, monotonic() - begun))
-                elif monotonic() - told >= _TOLD:
-                    told = monotonic()
-                    notice(_told(feed, arrivals, told - begun))
+                    line.update(_reported(feed, arrivals, monotonic() - begun))
+                elif monotonic() - reported >= _REPORTED:
+                    reported = monotonic()
+                    notice(_reported(feed, arrivals, reported - begun))
     finally:
         recorder.close()
     return arrivals
 
 
-def _told(feed: Feed, arrivals: Arrivals, seconds: float) -> str:
+def _reported(feed: Feed, arrivals: Arrivals, seconds: float) -> str:
     minutes, rest = divmod(int(seconds), 60)
     text = f"recording {minutes}:{rest:02d}, {arrivals.count} samples of {len(arrivals.names)} "
     lost = [f"{state.name}: {state.error}" for state in feed.states() if state.error]
@@ -244,7 +244,7 @@ def arrival_table(wanted: tuple[Need, ...], arrivals: Arrivals) -> Table:
 
 @contextlib.contextmanager
 def _ended() -> Iterator[Callable[[], bool]]:
-    """Tell of Ctrl-C and of a request to end, so that what was recorded is joined."""
+    """Announce Ctrl-C and a request to end, so that what was recorded is joined."""
     asked = threading.Event()
     if threading.current_thread() is not threading.main_thread():
         yield asked.is_set

@@ -105,8 +105,8 @@ def reproduce(
         text = json.dumps({"rows": [r.record() for r in rows]}, ensure_ascii=False, indent=1)
         if not write_json(json_path, text):
             say_written(json_path)
-    told = [f"{sum(r.verdict is v for r in rows)} {v}" for v in papers.Verdict]
-    tell(f"{len(rows)} rows: {', '.join(told)}")
+    reported = [f"{sum(r.verdict is v for r in rows)} {v}" for v in papers.Verdict]
+    tell(f"{len(rows)} rows: {', '.join(reported)}")
     unaccounted = [row for row in rows if not row.accounted]
     for row in unaccounted:
         tell(f"differs without a reason, {row.paper}: {row.name}")
@@ -165,7 +165,7 @@ def show(done: Reproduced) -> None:
     for shown in (*done.tables, done.comparison):
         table = Table(title=shown.title)
         for k, name in enumerate(shown.columns):
-            # The widest column gives way first, by lines: nothing of a table is cut off.
+            # The widest column is replaced first, by lines: nothing of a table is cut off.
             table.add_column(name, justify="left" if k == 0 else "right", overflow="fold")
         for row in shown.rows:
             table.add_row(*row)

@@ -70,7 +70,7 @@ class Terminal(io.TextIOBase):
         return self.below.fileno()
 
     def writable(self) -> bool:
-        """Tell that the stream can be written to."""
+        """Say that the stream can be written to."""
         return True
 
     @property

@@ -393,7 +393,7 @@ def result_table(
     A ``narrow`` one has the status alone, and not how long the drive was.
     """
     from weighbridge.vehicle.data_sheet import by_data_sheet
-    from weighbridge.vehicle.telling import worth
+    from weighbridge.vehicle.description import worth
 
     table = _table(narrow=narrow)
     if rows and by_data_sheet(car):

@@ -148,10 +148,10 @@ class _Run:
                 while self._fill() or self._inside or not self.count.complete:
                     self._look_ahead()
                     self._collect(self._suspects)
-                    self._told()
+                    self._reported()
                 for job in self._suspects:
                     self._try_alone(job)
-                    self._told()
+                    self._reported()
         finally:
             futures = [future for future, _ in self._inside.values()]
             if futures and self._client.status == "running":
@@ -268,12 +268,12 @@ class _Run:
             while self._inside:
                 self._measure()
                 self._collect(again)
-                self._told()
+                self._reported()
             if not again:
                 return
         self.count.add(fail_job(job, Problem.of("fleet.worker_died", tries=TRIES)))
 
-    def _told(self) -> None:
+    def _reported(self) -> None:
         if self._tell is not None:
             self._tell(self.count)
 

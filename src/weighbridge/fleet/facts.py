@@ -129,12 +129,12 @@ def of_vehicle(vehicle: Vehicle) -> dict[str, Any]:
 
 
 def _segments(
-    told: Sequence[dict[str, Any]], spans: Sequence[Span], travel: Travel
+    reported: Sequence[dict[str, Any]], spans: Sequence[Span], travel: Travel
 ) -> list[dict[str, Any]]:
     """Return a row per span: the segment of `weigh`, and how far its mass reaches."""
     rows = []
     for number, span in enumerate(spans):
-        found = {} if span.segment is None else told[span.segment]
+        found = {} if span.segment is None else reported[span.segment]
         edges = span.start, span.end
         row = {"from_s": span.start, "to_s": span.end, "weighed_s": span.weighed}
         row |= travel.between(*edges) | {"period_km": travel.periods(*edges)}

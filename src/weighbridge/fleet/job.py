@@ -135,8 +135,8 @@ def weigh_job(job: Job) -> Receipt:
         # A copy of it was weighed at the same time.
         write_found(Path(job.results), key, visible(job.recording.source), job.seen)
         return Receipt(key, THERE, 0, 0, time.perf_counter() - begin)
-    told = {"content": content, "seen": job.seen}
-    return _written(job, key, [row | told for row in rows], tries, begin)
+    reported = {"content": content, "seen": job.seen}
+    return _written(job, key, [row | reported for row in rows], tries, begin)
 
 
 def fail_job(job: Job, reason: Problem) -> Receipt:
@@ -344,5 +344,5 @@ def _of_the_machine(error: BaseException | None) -> bool:
 
 
 def named_error(error: Exception) -> str:
-    """Say what an error says, with the kind of one that is not told to users."""
+    """Say what an error says, with the kind of one that is not asked to users."""
     return str(error) if isinstance(error, WeighbridgeError) else f"{type(error).__name__}: {error}"

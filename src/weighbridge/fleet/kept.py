@@ -34,11 +34,11 @@ def keep_legs(results: Results) -> None:
     for day in _by_day(results, TABLE).keys() - drives.keys():
         shutil.rmtree(results.folder / TABLE / day, ignore_errors=True)
     for day, files in drives.items():
-        told = segments.get(day, [])
+        reported = segments.get(day, [])
         target = results.folder / TABLE / day / f"{TABLE}-0000.parquet"
-        if target.exists() and _newest([*files, *told]) < _newest([target]):
+        if target.exists() and _newest([*files, *reported]) < _newest([target]):
             continue
-        rows = legs(_read(files, DRIVES), _read(told, SEGMENTS))
+        rows = legs(_read(files, DRIVES), _read(reported, SEGMENTS))
         target.parent.mkdir(parents=True, exist_ok=True)
         write_table(target, rows)
 

@@ -69,18 +69,18 @@ def stamp(paths: Sequence[Path]) -> str | None:
     -------
     Of names, sizes, times and numbers of the same files; None where one cannot be asked
     """
-    told = []
+    reported = []
     try:
         for name, path in sorted(_named(paths)):
             found = path.stat()
-            # The time of change and the number of the file tell a copy with the old times.
-            told += [
+            # The time of change and the number of the file show a copy with the old times.
+            reported += [
                 name,
                 repr((found.st_size, found.st_mtime_ns, found.st_ctime_ns, found.st_ino)),
             ]
     except OSError:
         return None
-    return text_digest(told) if told else None
+    return text_digest(reported) if reported else None
 
 
 def _named(paths: Sequence[Path]) -> Iterable[tuple[str, Path]]:

@@ -213,7 +213,7 @@ def refuse_output(output: Path, shelf: Vehicles) -> None:
             raise ConfigError(
                 f"{output}: holds the vehicle files that are read; name another folder for --learn"
             )
-        # An earlier one gives way; anything else is told by this.
+        # An earlier one is replaced; anything else is shown by this.
         Vehicle.load(target)
 
 
@@ -230,7 +230,7 @@ def learn_vehicle(lesson: Lesson) -> dict[str, Any]:
     """
     from weighbridge.calibration.run import calibrate
 
-    car, told = lesson.assigned.vehicle, []
+    car, reported = lesson.assigned.vehicle, []
     weighed = [k for k in lesson.drives if math.isfinite(k.weighed)]
     row: dict[str, Any] = {
         "vehicle_id": lesson.assigned.id,
@@ -241,7 +241,7 @@ def learn_vehicle(lesson: Lesson) -> dict[str, Any]:
     row |= {"error_pct": 100.0 * error, "error_std_pct": 100.0 * std}
     row["contradicted"] = len(weighed) > 1 and abs(error) > APART * std
     if row["contradicted"]:
-        told.append(
+        reported.append(
             f"{len(weighed)} drives of known mass contradict the vehicle file: in the mean they "
             f"come out {abs(100.0 * error):.1f} % too {'heavy' if error > 0 else 'light'}, and "
             f"their standard deviation is {100.0 * std:.1f} %"
@@ -252,7 +252,7 @@ def learn_vehicle(lesson: Lesson) -> dict[str, Any]:
             drive = _read(lesson, known)
             one = calibrate([drive], [known.known], vehicle=car)
         except (WeighbridgeError, OSError) as problem:
-            told.append(
+            reported.append(
                 f"{Path(known.paths[0]).name} cannot be learnt from: "
                 f"{by_url(str(problem), known.paths)}"
             )
@@ -264,7 +264,7 @@ def learn_vehicle(lesson: Lesson) -> dict[str, Any]:
         alone.append((one.road.rolling_coefficient.value, math.degrees(mounting)))
     changes = _drifts(weighed, times, np.array(alone, dtype=float).reshape(-1, 2))
     row |= _columns(changes)
-    told += [text for text in map(_drift_text, DRIFTS, changes) if text]
+    reported += [text for text in map(_drift_text, DRIFTS, changes) if text]
     if drives:
         try:
             refined = with_drift(calibrate(drives, masses, vehicle=car), changes[0], times)
@@ -276,8 +276,8 @@ def learn_vehicle(lesson: Lesson) -> dict[str, Any]:
             refined.save(target)
             row["refined"] = name
         except WeighbridgeError as problem:
-            told.append(f"the file cannot be refined: {problem}")
-    return row | {"told": "; ".join(told)}
+            reported.append(f"the file cannot be refined: {problem}")
+    return row | {"told": "; ".join(reported)}
 
 
 def chosen(drives: Sequence[Known]) -> list[Known]:
@@ -292,7 +292,8 @@ def chosen(drives: Sequence[Known]) -> list[Known]:
 def _mean_error(weighed: Sequence[Known]) -> tuple[float, float]:
     """Mean of the relative errors, and how far they may be off together.
 
-    What a vehicle file leaves open is the same in all its drives: the mean is no surer than one.
+    What a vehicle file leaves uncertain is the same in all its drives: the mean is no surer than
+    one.
     """
     if not weighed:
         return math.nan, math.nan
@@ -329,7 +330,7 @@ def _drift_text(watched: tuple[str, str, str], change: Drift) -> str:
 
 
 def with_drift(refined: Vehicle, change: Drift, times: Sequence[datetime]) -> Vehicle:
-    """Count a drift of the torque scale in what a refined file leaves open, and note it.
+    """Count a drift of the torque scale in what a refined file leaves uncertain, and note it.
 
     The file holds the mean of its drives. Where the scale changes by d over their time, the next
     drives, which the file is for, are at least ``d / 2`` off.

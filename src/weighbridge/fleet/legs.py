@@ -178,7 +178,7 @@ def load_changes(rows: pl.DataFrame) -> pl.DataFrame:
     """Return where and when the load of a vehicle changed between two of its legs.
 
     What both masses share, an error of the vehicle file, moves their difference by as much of it
-    as the difference is of the mass. Within a drive the estimator told both loads apart; between
+    as the difference is of the mass. Within a drive the estimator distinguishes both loads; between
     drives a change is reported from `SURE` standard deviations on.
 
     Parameters

@@ -108,9 +108,9 @@ def page(report: FleetReport, title: str) -> str:
 
 def _answer(report: FleetReport) -> str:
     """Say who was overloaded, when and how sure."""
-    told = report.overloads
-    alarms, limits = told.filter(pl.col("level") == "alarm"), report.limits
-    unsure = told.height - alarms.height
+    reported = report.overloads
+    alarms, limits = reported.filter(pl.col("level") == "alarm"), report.limits
+    unsure = reported.height - alarms.height
     sure = f"{100 * limits.alarm:g} % sure"
     if alarms.height:
         who = _count(alarms["vehicle_id"].n_unique(), "vehicle")
@@ -121,7 +121,7 @@ def _answer(report: FleetReport) -> str:
         rest = "no leg"
     # One row per vehicle, its surest leg: one that is always overloaded shall hide no other.
     alarm = pl.col("level") == "alarm"
-    first = told.with_columns(
+    first = reported.with_columns(
         sure=alarm.sum().over("vehicle_id"), likely=(~alarm).sum().over("vehicle_id")
     ).unique("vehicle_id", keep="first", maintain_order=True)
     judged = report.legs["level"].is_not_null().sum()
@@ -331,13 +331,13 @@ def _number(value: float) -> str:
 
 
 def how_sure(probability: float) -> str:
-    """Tell a probability in percent; nothing measured is sure, so that none is 100 %."""
+    """Return a probability in percent; nothing measured is sure, so that none is 100 %."""
     percent = 100.0 * probability
     return "above 99.9 %" if percent > 99.9 else f"{percent:.1f} %"
 
 
 def _towing(leg: dict[str, Any]) -> str:
-    """Tell a trailer that is known, or guessed from the mass alone."""
+    """Return a trailer that is known, or guessed from the mass alone."""
     return ", with trailer" if leg["coupled"] else ", trailer?" if leg["trailer"] else ""
 
 

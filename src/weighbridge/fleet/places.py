@@ -132,7 +132,7 @@ def _failed() -> pl.Expr:
 
 
 def _moved(places: pl.DataFrame, there: Callable[[str], bool]) -> pl.Series:
-    """Tell which places have lost their recording to another."""
+    """Return which places have lost their recording to another."""
     several = (pl.len().over("content") > 1) & pl.col("content").is_not_null()
     asked = places.select("place", "content", several=several)
     gone = [few and not there(place) for place, _, few in asked.iter_rows()]

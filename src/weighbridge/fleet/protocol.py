@@ -78,13 +78,13 @@ def outside(known: pl.DataFrame) -> pl.DataFrame:
         relative); null where none is outside.
     """
     low, high, true = pl.col("low95_kg"), pl.col("high95_kg"), pl.col("known_kg")
-    told = known.filter(low.is_not_null() & high.is_not_null()).with_columns(
+    reported = known.filter(low.is_not_null() & high.is_not_null()).with_columns(
         out=(true < low) | (true > high),
         far=((true - pl.col("mass_kg")) / (0.5 * (high - low))).abs(),
     )
     worst = pl.col("start", "known_kg", "low95_kg", "high95_kg", "error")
     return (
-        told.group_by("vehicle_id", maintain_order=True)
+        reported.group_by("vehicle_id", maintain_order=True)
         .agg(
             pl.len().cast(pl.Int64).alias("known"),
             pl.col("out").sum().cast(pl.Int64).alias("outside"),

@@ -66,7 +66,7 @@ def drives(url: str, *, as_drive: bool) -> Iterator[tuple[str, str | None]]:
                     if files.isdir(path):
                         yield files.unstrip_protocol(path.rstrip("/")), _stamp(_find(files, path))
                 return
-            below = {f: told for path in found for f, told in _find(files, path).items()}
+            below = {f: reported for path in found for f, reported in _find(files, path).items()}
         else:
             below = _find(files, root)
     except Exception as error:  # each store has errors of its own
@@ -82,13 +82,13 @@ def _find(files: Any, path: str) -> dict[str, Mapping[str, Any]]:
 
 def _stamp(files: Mapping[str, Mapping[str, Any]]) -> str | None:
     """Digest of what a store says of files; None where it does not say when one changed."""
-    told = []
+    reported = []
     for path, about in sorted(files.items()):
         version = [(name, str(about[name])) for name in _VERSION if about.get(name) is not None]
         if not version:
             return None
-        told += [path, repr((about.get("size"), version))]
-    return text_digest(told) if told else None
+        reported += [path, repr((about.get("size"), version))]
+    return text_digest(reported) if reported else None
 
 
 def exists(url: str) -> bool:

@@ -67,8 +67,8 @@ class FleetReport:
     @property
     def overloads(self) -> pl.DataFrame:
         """Overloaded legs, the surest first."""
-        told = self.legs.filter(pl.col("level").is_in(["warn", "alarm"]))
-        return told.sort("overload", "mass_kg", descending=True, nulls_last=True)
+        reported = self.legs.filter(pl.col("level").is_in(["warn", "alarm"]))
+        return reported.sort("overload", "mass_kg", descending=True, nulls_last=True)
 
     def to_dict(self) -> dict[str, Any]:
         """Return all but the legs, which `write_legs` writes, as plain values."""
@@ -140,13 +140,13 @@ def report(
         The folder holds no results, a limit cannot be, or a table cannot be read or is damaged.
     """
     limits = limits or Limits()
-    told = [] if tickets is None else read_tickets(Path(tickets))
+    reported = [] if tickets is None else read_tickets(Path(tickets))
     drives, segments = (collected(read(results), results) for read in (read_drives, read_segments))
     coupled = [] if couplings is None else read_couplings(Path(couplings))
     rows = legs(drives, segments, limits, coupled)
     changes = load_changes(rows)
     vehicles = figures.per_vehicle(rows, changes)
-    known = protocol.known_masses(rows, drives, told)
+    known = protocol.known_masses(rows, drives, reported)
     out = protocol.outside(known)
     return FleetReport(
         limits=limits,

@@ -30,7 +30,7 @@ from weighbridge.fleet.vehicles import Vehicles
 if TYPE_CHECKING:
     import polars as pl
 
-_TOLD: Final = 2.0  # between writings of how far the run is [s]
+_REPORTED: Final = 2.0  # between writings of how far the run is [s]
 _GATHER: Final = 5_000  # receipts between gatherings of their parts
 _SEND: Final = 60.0  # at most between sendings of results behind a URL [s]
 
@@ -147,9 +147,9 @@ def weigh_drives(
         learn=None if learn is None else Path(learn),
         tickets=None if tickets is None else Path(tickets),
     )
-    told = None if progress is None else lambda count: progress(count.done, count.found)
+    reported = None if progress is None else lambda count: progress(count.done, count.found)
     place = place_of_results(results)
-    run_fleet([str(one) for one in given], Path(vehicles), place, how, told)
+    run_fleet([str(one) for one in given], Path(vehicles), place, how, reported)
     return read_drives(place.folder)
 
 
@@ -293,7 +293,7 @@ def _jobs_of(
 
 
 def _stamp(recording: Recording) -> str | None:
-    """What tells, without reading, whether the files of a recording have changed."""
+    """What shows, without reading, whether the files of a recording have changed."""
     if any(is_url(path) for path in recording.paths):
         return recording.stamp
     return stamp([Path(path) for path in recording.paths])
@@ -337,7 +337,7 @@ class _Teller:
         self._every = _SEND if isinstance(place, Bucket) else math.inf
         self._sent = time.monotonic()
         self._tell = tell
-        self._last = -_TOLD
+        self._last = -_REPORTED
         self._count = Count()
         self._gathered = 0
         self._gathering: Future[None] | None = None
@@ -347,7 +347,7 @@ class _Teller:
         self._count = count
         if self._tell is not None:
             self._tell(count)
-        if time.monotonic() - self._last >= _TOLD:
+        if time.monotonic() - self._last >= _REPORTED:
             self._last = time.monotonic()
             self._write(ended=False)
             new = count.done - self._gathered
@@ -381,6 +381,6 @@ class _Teller:
         self._place.send(last=False)
 
     def _write(self, *, ended: bool) -> None:
-        told: dict[str, Any] = plain(self._count) | {"ended": ended, "at": time.time()}
+        reported: dict[str, Any] = plain(self._count) | {"ended": ended, "at": time.time()}
         with contextlib.suppress(ConfigError):
-            self._results.tell(told)
+            self._results.write_progress(reported)

@@ -115,8 +115,8 @@ def write_found(folder: Path, key: str, source: str, seen: int | None) -> None:
             path.parent.mkdir(parents=True, exist_ok=True)
         except OSError as e:
             raise ConfigError(f"{path} cannot be written: {e.strerror or e}") from None
-        told = {"key": key, "place": source, "at": now, "seen": seen}
-        write_whole(path, json.dumps(told) + "\n")
+        entry = {"key": key, "place": source, "at": now, "seen": seen}
+        write_whole(path, json.dumps(entry) + "\n")
 
 
 def read_found(folder: Path) -> pl.DataFrame:
@@ -437,11 +437,11 @@ class Results:
         home.mkdir(parents=True, exist_ok=True)
         write_table(home / f"{table}-{number:04d}.parquet", rows.sort(by))
 
-    def tell(self, progress: dict[str, Any]) -> None:
+    def write_progress(self, progress: dict[str, Any]) -> None:
         """Write how far a run is."""
         write_whole(self.folder / PROGRESS, json.dumps(progress) + "\n")
 
-    def told(self) -> dict[str, Any]:
+    def read_progress(self) -> dict[str, Any]:
         """Return how far the last run came; empty where that is not known."""
         try:
             found = json.loads((self.folder / PROGRESS).read_text(encoding="utf-8"))
@@ -478,7 +478,7 @@ def check_end(path: Path) -> None:
 
 def write_table(path: Path, rows: pl.DataFrame) -> None:
     """Write a file of a table; one without rows stays, as a reader may be about to open it."""
-    # By way of the memory: a full disk is told as one, which polars does not.
+    # By way of the memory: a full disk is reported as one, which polars does not.
     data = io.BytesIO()
     rows.write_parquet(data, compression="zstd")
     with whole_file(path) as part:
@@ -499,7 +499,7 @@ def read_table(path: Path, names: list[str] | None) -> pl.DataFrame:
 
 @contextlib.contextmanager
 def _whole(path: Path) -> Iterator[None]:
-    """Tell a damaged file, and what to remove so that its drives are weighed again."""
+    """Report a damaged file, and what to remove so that its drives are weighed again."""
     try:
         yield
     except (pl.exceptions.PolarsError, OSError) as error:

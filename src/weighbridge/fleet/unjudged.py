@@ -37,12 +37,12 @@ def with_causes(rows: pl.DataFrame, permitted: str) -> pl.DataFrame:
     )
     found = {name: pl.lit(None, pl.String) for name in ("prevents", "reason_id", "reason")}
     for what, lacking, problem in reversed(lacks):
-        told = {
+        reported = {
             "prevents": pl.lit(what),
             "reason_id": pl.col("reason_id") if problem is None else pl.lit(problem.id),
             "reason": pl.col("reason") if problem is None else pl.lit(problem.text),
         }
-        found = {n: pl.when(lacking).then(told[n]).otherwise(found[n]) for n in found}
+        found = {n: pl.when(lacking).then(reported[n]).otherwise(found[n]) for n in found}
     return rows.with_columns(**found)
 
 

@@ -224,7 +224,7 @@ def _read_mapping(path: Path) -> _MappingFile:
 
 
 def _is_vehicle(path: Path) -> bool:
-    """Tell a vehicle file from a mapping beside it."""
+    """Distinguish a vehicle file from a mapping beside it."""
     import tomllib
 
     try:

@@ -41,7 +41,7 @@ def jumps(track: InertiaTrack) -> tuple[float, ...]:
 
 
 APART: Final = 4.0
-"""Masses differ beyond doubt by so many standard deviations."""
+"""Masses differ surely by so many standard deviations."""
 
 
 def load_changes(track: InertiaTrack, believed: tuple[float, ...]) -> tuple[float, ...]:

@@ -82,7 +82,7 @@ class SuspensionCheck:
 
     @property
     def off(self) -> Floats:
-        """(8,) how far each is off, beyond doubt and by enough to matter; else 0 [-]."""
+        """(8,) how far each is off, surely and by enough to matter; else 0 [-]."""
         wrong = np.abs(self.factor - 1.0)
         return np.where(wrong > np.maximum(0.05, 4.0 * self.std), wrong, 0.0)
 

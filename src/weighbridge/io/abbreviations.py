@@ -1,4 +1,4 @@
-"""Shortened words of signal names, and words that say nothing of a quantity or tell of another."""
+"""Shortened words of signal names, and words that say nothing of a quantity or report another."""
 
 from __future__ import annotations
 

@@ -87,7 +87,7 @@ def read_blf(path: Path, table: str | None, mapping: TableMapping | None) -> Log
 
 
 def _start(raw: bytes) -> float | None:
-    """When the log began [s since 1970], in the clock of the logger; None if not told."""
+    """When the log began [s since 1970], in the clock of the logger; None if not reported."""
     year, month, _, day, hour, minute, second, milli = struct.unpack_from("<8H", raw, 40)
     try:
         return datetime(

@@ -96,9 +96,9 @@ def decode(
         truck = decode_j1939(rest, name)
         groups = truck.summary.decoded
         ignored = truck.summary.ignored
-        told = ", ".join(f"{g} ({n})" for g, n in groups.items())
+        reported = ", ".join(f"{g} ({n})" for g, n in groups.items())
         done.contents.append(
-            f"J1939: {told}; not used: {counted(len(ignored), 'other parameter group')} "
+            f"J1939: {reported}; not used: {counted(len(ignored), 'other parameter group')} "
             f"({counted(sum(ignored.values()), 'frame')})"
         )
         _add(truck.signals, truck.summary.problems, "J1939", name, done, settled)
@@ -157,7 +157,7 @@ def _nothing(
     done: Decoded,
     diagnosis: Sequence[str],
 ) -> Problem:
-    """Say why the traffic gave no signal; ``diagnosis`` is what OBD-II told nevertheless."""
+    """Say why the traffic gave no signal; ``diagnosis`` is what OBD-II reported nevertheless."""
     if not len(frames):
         return Problem.of("bus.no_frames", file=name)
     about: dict[str, Any] = {"file": name, "frames": _counts(frames)}
@@ -265,9 +265,9 @@ def _tell_contents(
             done.contents.append(f"{d.path.name}: {'; '.join(read)}")
         if skipped:
             named = {m.name: ", ".join(s.name for s in m.signals[:_NAMED]) for m in d.messages}
-            told = "; ".join(f"{m} ({found[m].size}): {named[m]}" for m in skipped[:_NAMED])
+            reported = "; ".join(f"{m} ({found[m].size}): {named[m]}" for m in skipped[:_NAMED])
             more = f" and {len(skipped) - _NAMED} more" if len(skipped) > _NAMED else ""
-            done.contents.append(f"{d.path.name}, not used: {told}{more}")
+            done.contents.append(f"{d.path.name}, not used: {reported}{more}")
             for m in skipped:
                 used[found[m]] = True
 

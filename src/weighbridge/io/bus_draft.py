@@ -68,7 +68,7 @@ def draft_bus(path: Path, databases: Sequence[Database]) -> Draft:
 
 
 def _read_anyway(frames: Frames) -> frozenset[str]:
-    """Name what OBD-II answers and J1939 in the traffic tell without a database."""
+    """Name what OBD-II answers and J1939 in the traffic show without a database."""
     signals = decode_obd(frames).signals
     if is_j1939(rest := frames.select(frames.extended)):
         signals = [*signals, *decode_j1939(rest).signals]

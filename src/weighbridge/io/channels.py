@@ -83,11 +83,11 @@ class Recording:
     ----------
     channels : in the order of the log
     absolute : whether their time counts from 1970
-    start : where it begins [s since 1970], if it does not count from there and the log tells
-    of_day : its clock counts from midnight, of a day that the log does not tell
+    start : where it begins [s since 1970], if it does not count from there and the log shows
+    of_day : its clock counts from midnight, of a day that the log does not show
     time : what a mapping has to call the time; empty where the format has a clock of its own
     time_unit : suffix of that time's unit, where the log does not state it
-    time_format : how that time is written, as a mapping tells it; empty for numbers
+    time_format : how that time is written, as a mapping shows it; empty for numbers
     notes : what was left out or is not sure; a reader of another package may give sentences
     frames : raw bus traffic beside the channels
     """
@@ -154,7 +154,7 @@ def drafter(opener: Opener) -> Callable[[Path], Draft]:
 
 
 def log_of(path: Path, found: Recording, table: str | None, mapping: TableMapping | None) -> Log:
-    """Take the channels that a mapping names, and those that the format or a canonical name tells.
+    """Take the channels that a mapping names, and those that the format or a canonical name shows.
 
     Parameters
     ----------
@@ -241,7 +241,7 @@ def channel_named(channels: list[Channel], name: str) -> Channel | None:
 
 
 def _known(log: Log, found: Recording, table: str | None, taken: set[str]) -> _Wanted:
-    """Channels that the format or a canonical name tells; others that no mapping took are told."""
+    """Channels that the format or a canonical name states; others not mapped are reported."""
     wanted: _Wanted = {}
     unknown: list[str] = []
     for channel in found.channels:
@@ -267,8 +267,8 @@ def _last(name: str) -> str:
     return _PARTS.split(name)[-1]
 
 
-def _told(name: str) -> str:
-    """What of a name tells the quantity: its last part, or two where that says nothing."""
+def _reported(name: str) -> str:
+    """What of a name shows the quantity: its last part, or two where that says nothing."""
     parts = _PARTS.split(name)
     if len(parts) > 1 and parts[-1].lower() in _EMPTY_NAMES:
         return f"{parts[-2]} {parts[-1]}"
@@ -277,7 +277,7 @@ def _told(name: str) -> str:
 
 def _judged(channels: list[Channel], columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, ...]:
     """Judge columns by the values of all channels."""
-    told = {c.name: Values(c.time, c.values, unit_in_name(c.name, c.unit)) for c in channels}
+    reported = {c.name: Values(c.time, c.values, unit_in_name(c.name, c.unit)) for c in channels}
     # What the format itself knows is compared too.
     nan = float("nan")
     known = tuple(
@@ -285,8 +285,8 @@ def _judged(channels: list[Channel], columns: tuple[DraftColumn, ...]) -> tuple[
         for c in channels
         if c.quantity
     )
-    judged = with_judged_units((*columns, *known), told)
-    return with_judged_values(judged, told)[: len(columns)]
+    judged = with_judged_units((*columns, *known), reported)
+    return with_judged_values(judged, reported)[: len(columns)]
 
 
 def draft_of(path: Path, found: Recording) -> Draft:
@@ -305,7 +305,7 @@ def draft_of(path: Path, found: Recording) -> Draft:
     known = {c.quantity for c in channels if c.quantity}
     unnamed = [c for c in channels if not c.quantity]
     units = [stated_unit(c.unit) for c in unnamed]
-    named = recognise_all([_told(c.name) for c in unnamed], units, misfits=True)
+    named = recognise_all([_reported(c.name) for c in unnamed], units, misfits=True)
     columns = checked(
         tuple(
             replace(draft_column(c.name, n, c.values, u), rate=usual_rate(c.time))
@@ -322,8 +322,8 @@ def draft_of(path: Path, found: Recording) -> Draft:
             "write [signals] of a mapping by hand"
         )
     # Channels that stand for a name alone have no instants of their own.
-    told = [c for c in channels if c.quantity or np.isfinite(c.values).any()] or channels
-    ends = [(float(np.nanmin(c.time)), float(np.nanmax(c.time))) for c in told]
+    reported = [c for c in channels if c.quantity or np.isfinite(c.values).any()] or channels
+    ends = [(float(np.nanmin(c.time)), float(np.nanmax(c.time))) for c in reported]
     doubts = [_noted(note).text for note in found.notes]
     doubts += [
         f"{n!r} is there {k} times; the longest is taken" for n, k in counted.items() if k > 1
@@ -335,6 +335,6 @@ def draft_of(path: Path, found: Recording) -> Draft:
         time_format=found.time_format,
         duration=max(b for _, b in ends) - min(a for a, _ in ends),
         columns=columns,
-        doubts=tuple(doubts),
+        questions=tuple(doubts),
         read_anyway=frozenset(known),
     )

@@ -115,7 +115,7 @@ def _apart(logs: Sequence[Log]) -> list[Problem]:
 
 
 def _doubts(logs: Sequence[Log]) -> list[Problem]:
-    """Tell of files with dates that agree better under an offset."""
+    """Report files with dates that agree better under an offset."""
     problems = []
     dated = [log for log in logs if log.absolute]
     for k, log in enumerate(dated):
@@ -133,7 +133,7 @@ def _doubts(logs: Sequence[Log]) -> list[Problem]:
                         serious=apart > _LATE,
                         first=other.path.name,
                         second=log.path.name,
-                        apart=_told(found),
+                        apart=_reported(found),
                         by=found.offset,
                         std=found.std,
                         what=what,
@@ -154,7 +154,7 @@ def _move(fixed: Sequence[Log], group: Sequence[Log], why: str) -> Problem:
     return Problem.of(
         "clock.aligned",
         group=_names(group),
-        offset=_told(found),
+        offset=_reported(found),
         by=found.offset,
         std=found.std,
         fixed=_names(fixed),
@@ -167,7 +167,7 @@ def _move(fixed: Sequence[Log], group: Sequence[Log], why: str) -> Problem:
 def _onto_day(dated: Sequence[Log], counted: Sequence[Log], why: str) -> Problem:
     """Put times of day on the day of files with dates, by what they share, else by the hour.
 
-    What they share tells how far the clocks are apart, tenths of a second included: every drive of
+    What they share shows how far the clocks are apart, tenths of a second included: every drive of
     the two devices is then on one clock. The hour alone leaves what the clocks differ by. It may be
     that of any zone, whole or half hours from UTC; where a mapping gives the offset, no more is
     sought.
@@ -186,7 +186,7 @@ def _onto_day(dated: Sequence[Log], counted: Sequence[Log], why: str) -> Problem
             counted,
             zone,
             dated,
-            phrase("off_by_motion", why=why, what=what, offset=_told(shared_motion)),
+            phrase("off_by_motion", why=why, what=what, offset=_reported(shared_motion)),
         )
     (a0, a1), (b0, b1) = _span(dated), _span(counted)
     shorter = min(a1 - a0, b1 - b0)
@@ -231,7 +231,11 @@ def _offset(fixed: Sequence[Log], group: Sequence[Log]) -> tuple[Alignment | Non
         reach = _LATE + 4.0 * (best.std + other.std)
         if abs(other.offset - best.offset) > reach:
             text = phrase(
-                "two_offsets", what=what, offset=_told(best), second=second, other=_told(other)
+                "two_offsets",
+                what=what,
+                offset=_reported(best),
+                second=second,
+                other=_reported(other),
             )
             return (
                 Alignment(best.offset, best.std, best.correlation, 1.0, best.overlap, text),
@@ -240,7 +244,7 @@ def _offset(fixed: Sequence[Log], group: Sequence[Log]) -> tuple[Alignment | Non
     return best, what
 
 
-def _told(found: Alignment) -> str:
+def _reported(found: Alignment) -> str:
     """Offset with its standard deviations: how well the signals fit, and what that says of clocks.
 
     An offset takes in how late the sensors are: the signals lie on each other, the clocks may not.

@@ -39,7 +39,7 @@ UNIT_TEXTS: Final[dict[str, str]] = {
     "unit_meterperseconsquar": "mps2", "unit_degreofarc": "deg", "unit_secon": "s",
     "sec": "s", "seconds": "s", "µs": "us", "μs": "us",
 }  # fmt: skip
-"""Units as people and loggers write them, and the suffix each stands for."""
+"""Units as people and loggers write them, and the suffix each means."""
 
 _SPELLED: Final = {
     "per": "/", "squared": "2",
@@ -122,7 +122,7 @@ def stated_unit(text: str) -> str | None:
 
     Parameters
     ----------
-    text : what stands in a row or column of units; empty, or a mark such as - for none
+    text : what is in a row or column of units; empty, or a mark such as - for none
     """
     word = text.strip().strip("[]()").strip()
     return (unit_suffix(word) or f"{UNKNOWN_UNIT}{word}") if word else None
@@ -155,7 +155,7 @@ def parse_column(
     Parameters
     ----------
     column : its name
-    table : canonical table it stands in; None where one file holds all
+    table : canonical table it is in; None where one file holds all
     unit : unit suffix known otherwise, for a name that carries none
 
     Returns

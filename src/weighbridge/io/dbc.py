@@ -24,7 +24,7 @@ from weighbridge.signals import Bools, Floats, Problem
 DbcSource = str | Path
 """A DBC file, for one bus alone where it is written ``1:file.dbc``."""
 
-# Where a signal lies, and how long a message is. The library makes room for every bit told.
+# Where a signal lies, and how long a message is. The library makes room for every bit reported.
 _PLACES: Final = re.compile(r":\s*(\d+)\s*\|\s*(\d+)\s*@")
 _SIZES: Final = re.compile(r"\bBO_\s+\d+\s+\w+\s*:\s*(\d+)")
 
@@ -97,7 +97,7 @@ def dbc_path(source: DbcSource) -> Path:
 
 
 def seen_from(source: DbcSource, home: Path) -> str:
-    """Return a DBC that stands in a file of a folder, by a path that holds without it.
+    """Return a DBC that is in a file of a folder, by a path that holds without it.
 
     Parameters
     ----------
@@ -270,7 +270,7 @@ def find_signal(
 
 
 def is_readable(signal: Any) -> bool:
-    """Tell whether a signal is a number of a size that can be taken out."""
+    """Return whether a signal is a number of a size that can be taken out."""
     length = int(signal.length)
     return length in (16, 32, 64) if signal.is_float else 0 < length <= 64
 
@@ -294,8 +294,8 @@ def physical(frames: Frames, found: Found) -> tuple[Floats, NDArray[np.intp]]:
     at = at[_selected(frames, at, message, signal)]
     raw = _raw(frames.data[at], signal)
     if message.protocol == "j1939":
-        told = _available(raw, int(signal.length))
-        raw, at = raw[told], at[told]
+        reported = _available(raw, int(signal.length))
+        raw, at = raw[reported], at[reported]
     scale, offset = float(signal.scale), float(signal.offset)
     values = np.asarray(raw * scale + offset, dtype=np.float64)
     values[_named_no_value(raw, signal)] = np.nan

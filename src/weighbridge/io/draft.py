@@ -1,6 +1,6 @@
 """A mapping drafted from a log: how its text is written, its time, what its columns are.
 
-Nothing is asked and nothing is guessed silently: what is doubtful is told with the draft.
+Nothing is asked and nothing is guessed silently: what is questionable is reported with the draft.
 """
 
 from __future__ import annotations
@@ -48,13 +48,13 @@ _STRANGE_UNIT: Final = re.compile(
 """A unit at the end of a name that is not known: one of two, such as lb/min, or Hz and the like."""
 
 _BESIDE: Final = frozenset(("engine_speed", "vehicle_speed", "gnss_speed"))
-"""Signals of a torque source that tell no torque by themselves."""
+"""Signals of a torque source that show no torque by themselves."""
 
 _TELLING: Final = {UNITS[QUANTITIES[quantity].suffix].dimension for quantity in FOUND}
 """Dimensions of columns of any name that are held against others."""
 
 _AXES: Final = (("x",), ("y",), ("z",))
-"""Names of columns that tell an axis and no more."""
+"""Names of columns that show an axis and no more."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,13 +70,13 @@ class Draft:
     time_format : "clock", "iso" or a `strptime` format; empty for numbers
     duration : from the first to the last row [s]
     columns : all but the time
-    doubts : of the file and its time, one sentence each
+    questions : of the file and its time, one sentence each
     alike : other files that it is of, for they read alike
     row_rate : rows per second of a time that counts rows [Hz], NaN where nobody knows; None for
         a clock
     rows : of a table
     times : columns of a table that can be its time, the one taken first
-    read_anyway : quantities that the log is known to tell without a mapping
+    read_anyway : quantities that the log is known to show without a mapping
     """
 
     path: Path
@@ -86,7 +86,7 @@ class Draft:
     time_format: str
     duration: float
     columns: tuple[DraftColumn, ...]
-    doubts: tuple[str, ...] = ()
+    questions: tuple[str, ...] = ()
     alike: tuple[Path, ...] = ()
     row_rate: float | None = None
     rows: int = 0
@@ -114,9 +114,9 @@ class Draft:
         return tuple(c for c in self.columns if c.quantity)
 
     @property
-    def all_doubts(self) -> tuple[str, ...]:
-        """Doubts of the file and of its columns."""
-        return (*self.doubts, *(f"{c.name!r}: {c.doubt}" for c in self.columns if c.doubt))
+    def all_questions(self) -> tuple[str, ...]:
+        """Questions of the file and of its columns."""
+        return (*self.questions, *(f"{c.name!r}: {c.question}" for c in self.columns if c.question))
 
 
 class UnknownColumnsError(DriveError):
@@ -156,7 +156,7 @@ def draft(path: Path, names: Sequence[str] = ()) -> Draft:
         text, units = text_format(path, names)
         raw = read_text(path, text)
     if raw.rows == 0:
-        raise DriveError(f"{path} has a header and no rows; nothing can be told of its columns")
+        raise DriveError(f"{path} has a header and no rows; its columns cannot be recognised")
     in_cells = {n: raw.cell_unit(k) for k, n in enumerate(raw.names) if n not in units}
     units |= {n: stated for n, u in in_cells.items() if (stated := stated_unit(u)) is not None}
     above = head(path, text.skip_rows) if text.skip_rows else []
@@ -164,8 +164,8 @@ def draft(path: Path, names: Sequence[str] = ()) -> Draft:
     time = times[0]
     others = [n for k, n in enumerate(raw.names) if k != time.index]
     # Of a bare axis the name of the file says what is measured.
-    told = [f"{path.stem} {n}" if words_of(n) in _AXES else n for n in others]
-    named = recognise_all(told, [units.get(n) for n in others], misfits=True)
+    reported = [f"{path.stem} {n}" if words_of(n) in _AXES else n for n in others]
+    named = recognise_all(reported, [units.get(n) for n in others], misfits=True)
     columns = tuple(
         _column(raw, name, found, stated=units.get(name))
         for name, found in zip(others, named, strict=True)
@@ -174,7 +174,7 @@ def draft(path: Path, names: Sequence[str] = ()) -> Draft:
     times = by_motion(times, _swings(raw, columns))
     time = times[0]
     if time.row_rate is None:
-        in_numbers = _told(raw, time, units, columns)
+        in_numbers = _reported(raw, time, units, columns)
         columns = with_judged_values(with_judged_units(columns, in_numbers), in_numbers)
     found = Draft(
         path=path,
@@ -195,7 +195,7 @@ def draft(path: Path, names: Sequence[str] = ()) -> Draft:
     return timed(found, time)
 
 
-def _told(
+def _reported(
     raw: RawTable, time: DraftTime, units: Mapping[str, str], columns: Sequence[DraftColumn]
 ) -> dict[str, Values]:
     """Give the columns of a table that are numbers, with its clock."""
@@ -229,8 +229,8 @@ def tells_torque(*drafts: Draft) -> bool:
 
 def _unknown(found: Draft, names: Sequence[str]) -> str:
     """Say that none of a table's columns can be taken, and what helps."""
-    if doubts := [f"{c.name!r} is {c.doubt}" for c in found.columns if c.doubt]:
-        return f"{found.path}: none of its columns can be taken: {'; '.join(doubts[:3])}"
+    if questions := [f"{c.name!r} is {c.question}" for c in found.columns if c.question]:
+        return f"{found.path}: none of its columns can be taken: {'; '.join(questions[:3])}"
     counted = found.times[0].row_rate is not None
     timeless = "no column that can be its time, and " if counted else ""
     return (
@@ -261,17 +261,19 @@ def timed(found: Draft, time: DraftTime) -> Draft:
     """Give the draft of a table its time: what it says of rate and length goes by it."""
     known = time.seconds[np.isfinite(time.seconds)]
     step = np.diff(known)
-    doubts = list(time.doubts)
+    questions = list(time.questions)
     if step.size and np.mean(step == 0.0) > 0.2:
-        doubts.append("several rows share one time stamp; they are spread over the step in reading")
+        questions.append(
+            "several rows share one time stamp; they are spread over the step in reading"
+        )
     per_second = 1.0 if time.row_rate is None else time.row_rate
     if restarts := find_restarts(time.seconds / per_second):
-        doubts.append(
+        questions.append(
             f"the clock begins anew: read alone, this file is {len(restarts)} recordings, each "
             "weighed as a drive of its own"
         )
     elif np.any(step < 0.0):
-        doubts.append("the time goes back in places; rows there are left out in reading")
+        questions.append("the time goes back in places; rows there are left out in reading")
     others = (c for c in found.columns if c.name != time.column)
     return replace(
         found,
@@ -279,7 +281,7 @@ def timed(found: Draft, time: DraftTime) -> Draft:
         time_unit=time.unit,
         time_format=time.format,
         duration=float(known.max() - known.min()) / per_second if known.size else float("nan"),
-        doubts=tuple(doubts),
+        questions=tuple(questions),
         row_rate=time.row_rate,
         columns=tuple(_rated(c, time.seconds / per_second) for c in others),
     )
@@ -317,8 +319,8 @@ def _number(cell: object) -> bool:
     return not str(cell).strip() or is_number(str(cell).strip())
 
 
-def _nothing(name: str, doubt: str) -> DraftColumn:
-    return DraftColumn(name, "", "", False, float("nan"), float("nan"), float("nan"), 0, doubt)
+def _nothing(name: str, question: str) -> DraftColumn:
+    return DraftColumn(name, "", "", False, float("nan"), float("nan"), float("nan"), 0, question)
 
 
 def draft_column(name: str, found: Named, values: Floats, stated: str | None) -> DraftColumn:
@@ -326,7 +328,7 @@ def draft_column(name: str, found: Named, values: Floats, stated: str | None) ->
 
     Parameters
     ----------
-    name : as it stands in the log
+    name : as it is in the log
     found : what the name says
     values : (n,) in the log's unit; NaN where there is none
     stated : suffix of the unit that the log states elsewhere than in the name
@@ -341,20 +343,20 @@ def draft_column(name: str, found: Named, values: Floats, stated: str | None) ->
     if known.size == 0:
         return _nothing(name, f"not taken for {found.quantity}: it has no values")
     quantity = QUANTITIES[found.quantity]
-    told = stated if stated is not None and not stated.startswith(UNKNOWN_UNIT) else None
-    unit, doubt, by_log = told or found.unit, "", True
+    reported = stated if stated is not None and not stated.startswith(UNKNOWN_UNIT) else None
+    unit, question, by_log = reported or found.unit, "", True
     strange = _STRANGE_UNIT.search(name)
     if quantity.suffix and unit is None and strange is not None:
         return _nothing(name, unit_refused(quantity, strange.group(1)))
     if not quantity.suffix:
         unit = ""
     elif unit is not None and UNITS[unit].dimension == dimension_of(quantity):
-        doubt = _beyond(found.quantity, unit, known)
+        question = _beyond(found.quantity, unit, known)
     else:
         by_log = False
-        unit, doubt = _plausible_unit(name, found.quantity, known)
+        unit, question = _plausible_unit(name, found.quantity, known)
         if not unit:
-            return _nothing(name, doubt)
+            return _nothing(name, question)
     low, usual, high = map(float, np.quantile(known, [0.0, 0.5, 1.0]))
     return DraftColumn(
         name,
@@ -365,9 +367,9 @@ def draft_column(name: str, found: Named, values: Floats, stated: str | None) ->
         usual,
         high,
         known.size,
-        doubt,
+        question,
         rows=np.isfinite(values),
-        unsure=found.score < 1.0 or (bool(doubt) and by_log),
+        unsure=found.score < 1.0 or (bool(question) and by_log),
     )
 
 
@@ -381,7 +383,7 @@ def _beyond(quantity: str, unit: str, values: Floats) -> str:
 
 
 def _plausible_unit(name: str, quantity: str, values: Floats) -> tuple[str, str]:
-    """Unit in which values are those of a drive, the usual one first, and a doubt.
+    """Unit in which values are those of a drive, the usual one first, and a question.
 
     The unit is empty where they fit none.
     """

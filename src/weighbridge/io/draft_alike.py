@@ -14,7 +14,7 @@ from weighbridge.io.file_patterns import file_patterns, undated
 def merged(drafts: Sequence[Draft]) -> Draft | None:
     """Return one draft for files that read alike; None where they differ.
 
-    A unit that no file states is the one that the file with the largest values tells.
+    A unit that no file states is the one that the file with the largest values shows.
 
     Parameters
     ----------
@@ -24,14 +24,14 @@ def merged(drafts: Sequence[Draft]) -> Draft | None:
     if any(_layout(one) != _layout(first) for one in drafts[1:]):
         return None
     together = zip(*(one.columns for one in drafts), strict=True)
-    doubts = dict.fromkeys(doubt for one in drafts for doubt in one.doubts)
+    questions = dict.fromkeys(question for one in drafts for question in one.questions)
     columns = gyro_checked(tuple(map(_widest, together)))
     alike = tuple(path for one in drafts for path in (one.path, *one.alike))[1:]
-    return replace(first, columns=columns, doubts=tuple(doubts), alike=alike)
+    return replace(first, columns=columns, questions=tuple(questions), alike=alike)
 
 
 def kinds(drafts: Sequence[Draft], others: Sequence[Path] = ()) -> list[Draft]:
-    """Return one draft for each kind of file, where patterns of names tell the kinds apart.
+    """Return one draft for each kind of file, where patterns of names distinguish the kinds.
 
     Parameters
     ----------
@@ -40,10 +40,10 @@ def kinds(drafts: Sequence[Draft], others: Sequence[Path] = ()) -> list[Draft]:
 
     Returns
     -------
-    In the order of their first files; ``drafts`` where names do not tell the kinds apart.
+    In the order of their first files; ``drafts`` where names do not distinguish the kinds.
     """
     beside = [path.name for path in others]
-    # Vehicles whose files read alike may have names that only tell each of them from the others.
+    # Vehicles whose files read alike may have names that only show each of them from the others.
     for group in (_layout, _layout_and_name):
         found = [joined for each in _grouped(drafts, group) if (joined := merged(each)) is not None]
         alone = len(found) == 1 and not others
@@ -77,12 +77,12 @@ def _layout(one: Draft) -> tuple[object, ...]:
 
 
 def _widest(columns: Sequence[DraftColumn]) -> DraftColumn:
-    """One column of all files: its unit is told by the largest values."""
-    told = max(columns, key=lambda c: max(abs(c.low), abs(c.high)))
-    if not told.quantity:
-        return told
+    """One column of all files: its unit is shown by the largest values."""
+    reported = max(columns, key=lambda c: max(abs(c.low), abs(c.high)))
+    if not reported.quantity:
+        return reported
     return replace(
-        told,
+        reported,
         low=min(c.low for c in columns),
         high=max(c.high for c in columns),
         count=sum(c.count for c in columns),

@@ -1,4 +1,4 @@
-"""A column of a drafted mapping, and what columns of one log tell of each other's units."""
+"""A column of a drafted mapping, and what columns of one log report each other's units."""
 
 from __future__ import annotations
 
@@ -46,13 +46,13 @@ class DraftColumn:
 
     Attributes
     ----------
-    name : as it stands in the log
+    name : as it is in the log
     quantity : canonical name; empty where it is not known or not needed
     unit : suffix; empty for a quantity without one
     stated : whether the log itself states that unit
     low, usual, high : lowest, median and highest value in that unit; NaN where there is none
     count : cells with a number
-    doubt : what is not sure, one sentence; empty where it is
+    question : what is not sure, one sentence; empty where it is
     valid : signal of the same message that says whether it counts; empty for none
     unsure : whether what it is taken for is not sure: its name says more, or fits two quantities
     rows : (n,) which rows of its table have a number; None where it is not known
@@ -67,7 +67,7 @@ class DraftColumn:
     usual: float
     high: float
     count: int
-    doubt: str = ""
+    question: str = ""
     valid: str = ""
     unsure: bool = False
     rows: Bools | None = field(default=None, compare=False, repr=False)
@@ -88,7 +88,7 @@ def usual_rate(time: Floats) -> float:
 
 
 def checked(columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, ...]:
-    """Say what the columns of one log tell of each other's units."""
+    """Say what the columns of one log report each other's units."""
     columns = gyro_checked(gravity_checked(columns))
     return speed_checked(retarder_checked(percent_checked(columns)))
 
@@ -96,29 +96,29 @@ def checked(columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, ...]:
 def gyro_checked(columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, ...]:
     """Give the axes of a gyroscope one unit: a stated one, else that of the largest values."""
     axes = [c for c in columns if c.quantity.startswith("gyro_")]
-    told = max(axes, key=lambda c: (c.stated, max(abs(c.low), abs(c.high))), default=None)
-    if told is None:
+    reported = max(axes, key=lambda c: (c.stated, max(abs(c.low), abs(c.high))), default=None)
+    if reported is None:
         return columns
-    doubt = f"states no unit; taken as {told.unit}, as {told.name!r} is"
+    question = f"states no unit; taken as {reported.unit}, as {reported.name!r} is"
     return tuple(
-        replace(c, unit=told.unit, doubt=doubt)
-        if c in axes and c is not told and not c.stated
+        replace(c, unit=reported.unit, question=question)
+        if c in axes and c is not reported and not c.stated
         else c
         for c in columns
     )
 
 
 def speed_checked(columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, ...]:
-    """Doubt whose the one speed of a table of car and position is, if its name does not tell."""
+    """Question whose the one speed of a table of car and position is, if its name does not show."""
     tables = {QUANTITIES[c.quantity].table for c in columns if c.quantity not in ("", *_SPEEDS)}
     if not {"obd", "gnss"} <= tables:
         return columns
     speeds = [c for c in columns if c.quantity in _SPEEDS]
     if len(speeds) != 1 or _TELLING & set(words_of(speeds[0].name)):
         return columns
-    doubt = f"taken for {_SPEEDS[speeds[0].quantity]}; its name does not tell which"
+    question = f"taken for {_SPEEDS[speeds[0].quantity]}; its name does not tell which"
     return tuple(
-        replace(c, doubt=f"{c.doubt}; {doubt}" if c.doubt else doubt, unsure=True)
+        replace(c, question=f"{c.question}; {question}" if c.question else question, unsure=True)
         if c is speeds[0]
         else c
         for c in columns
@@ -126,31 +126,33 @@ def speed_checked(columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, ...]:
 
 
 def gravity_checked(columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, ...]:
-    """Tell m/s^2 from g by gravity where the log states no unit, and gravity that is missing."""
+    """Distinguish m/s^2 from g by gravity where the log states no unit; find it missing."""
     axes = [c for c in columns if c.quantity.startswith("accel_")]
     if len(axes) < 3:
         return columns
     size = float(np.linalg.norm([c.usual * UNITS[c.unit].factor for c in axes if c.stated]))
-    doubt = ""
+    question = ""
     unit = axes[0].unit
     if not axes[0].stated:
         read = float(np.linalg.norm([c.usual for c in axes]))
         unit = "g" if 0.7 < read < 1.4 else "mps2"
         size = read * UNITS[unit].factor
-        doubt = f"states no unit; taken as {unit}, for it reads {read:.2g} in the median"
+        question = f"states no unit; taken as {unit}, for it reads {read:.2g} in the median"
     if size < 0.5 * GRAVITY:
-        doubt = (
+        question = (
             f"reads {size:.2g} m/s^2 in the median: gravity was taken out of it; record the raw "
             "accelerometer"
         )
-    return tuple(replace(c, unit=unit, doubt=doubt or c.doubt) if c in axes else c for c in columns)
+    return tuple(
+        replace(c, unit=unit, question=question or c.question) if c in axes else c for c in columns
+    )
 
 
 def retarder_checked(columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, ...]:
-    """Doubt a retarder's torque that counts braking positive: SPN 520 counts it negative."""
-    doubt = "counts braking positive, SPN 520 negative: add factor = -1, or leave it out"
+    """Question a retarder's torque that counts braking positive: SPN 520 counts it negative."""
+    question = "counts braking positive, SPN 520 negative: add factor = -1, or leave it out"
     return tuple(
-        replace(c, doubt=doubt)
+        replace(c, question=question)
         if c.quantity == "retarder_torque" and c.low >= 0.0 and c.high > 0.0
         else c
         for c in columns
@@ -158,7 +160,7 @@ def retarder_checked(columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, ...
 
 
 def percent_checked(columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, ...]:
-    """Tell a torque in percent from one in N m where the log states no unit of it.
+    """Distinguish a torque in percent from one in N m where the log states no unit of it.
 
     A reference torque beside it is what it is a part of, and it stays within what percents are.
     """
@@ -172,6 +174,6 @@ def percent_checked(columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, ...]
     if not within or not torque.high < reference.low:
         return columns
     unit = "ratio" if max(abs(torque.low), torque.high) <= PERCENT[1] / 100.0 else "pct"
-    doubt = f"states no unit; taken as a part of {reference.name!r}, for it stays within 130 %"
-    told = replace(torque, quantity="engine_torque_fraction", unit=unit, doubt=doubt)
-    return tuple(told if c is torque else c for c in columns)
+    question = f"states no unit; taken as a part of {reference.name!r}, for it stays within 130 %"
+    reported = replace(torque, quantity="engine_torque_fraction", unit=unit, question=question)
+    return tuple(reported if c is torque else c for c in columns)

@@ -12,7 +12,7 @@ from weighbridge.signals.units import UNITS
 
 
 def with_compared_speeds(drafts: Sequence[Draft]) -> list[Draft]:
-    """Doubt the unit of a vehicle speed that is another unit's multiple of the satellites' speed.
+    """Question the unit of a speed that is another unit's multiple of the satellites' speed.
 
     Parameters
     ----------
@@ -26,17 +26,21 @@ def with_compared_speeds(drafts: Sequence[Draft]) -> list[Draft]:
     if meant is None:
         return list(drafts)
     if not speed.stated:
-        told = replace(
-            speed, unit=meant, doubt=f"states no unit; taken as {meant}, as {ground.name!r} shows"
+        reported = replace(
+            speed,
+            unit=meant,
+            question=f"states no unit; taken as {meant}, as {ground.name!r} shows",
         )
-        return _with(drafts, speed, told)
+        return _with(drafts, speed, reported)
     ratio = _si(speed.high, speed) / _si(ground.high, ground)
-    doubt = (
+    question = (
         f"reads {ratio:.2f} times the speed of {ground.name!r}, as {meant} under {speed.unit} "
         f'would: write unit = "{meant}" for it, if {ground.name!r} is in {ground.unit}'
     )
-    told = replace(speed, doubt=f"{speed.doubt}; {doubt}" if speed.doubt else doubt, unsure=True)
-    return _with(drafts, speed, told)
+    reported = replace(
+        speed, question=f"{speed.question}; {question}" if speed.question else question, unsure=True
+    )
+    return _with(drafts, speed, reported)
 
 
 def _with(drafts: Sequence[Draft], old: DraftColumn, new: DraftColumn) -> list[Draft]:
@@ -58,7 +62,7 @@ def _si(value: float, column: DraftColumn) -> float:
 def _meant(speed: DraftColumn, ground: DraftColumn) -> str | None:
     """Unit that a speed seems to be in; None where the one it is taken for fits.
 
-    Highest and median have to tell the same, so that neither a spike nor a stop decides.
+    Highest and median have to show the same, so that neither a spike nor a stop decides.
     """
     pairs = [
         (_si(a, speed), _si(b, ground))

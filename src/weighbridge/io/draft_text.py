@@ -16,7 +16,7 @@ from weighbridge.io.naming import is_time, recognise
 from weighbridge.io.table import SEPARATORS, TextFormat, cells, head
 
 HEAD_LINES: Final = 60
-"""Lines at the beginning that tell how a text is written."""
+"""Lines at the beginning that show how a text is written."""
 
 _LONG_HEAD: Final = 600
 """Lines of a text whose first ones hold no values: a long preamble."""
@@ -181,7 +181,7 @@ def _named_by_hand(
     at = (k for k, row in enumerate(rows) if len(row) == width and any(map(is_number, row)))
     first = next(at, None)
     if first is None:
-        raise DriveError(f"{path} has no row of numbers; nothing can be told of its columns")
+        raise DriveError(f"{path} has no row of numbers; its columns cannot be recognised")
     if len(columns) != width:
         raise DriveError(
             f"{path}: {len(columns)} columns are named and its rows have {width}, such as "

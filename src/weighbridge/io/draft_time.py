@@ -55,12 +55,12 @@ _COUNTERS: Final = frozenset(
 )  # fmt: skip
 """What loggers call a number that counts their rows, as `words_of` cuts it."""
 
-_TOLD_RATE: Final = re.compile(
+_STATED_RATE: Final = re.compile(
     r"\b(?:sampl\w*|logging|log|recording|data|abtast)[ _-]*(?:rate|freq\w*|frequenz)"
     r"[^\w.]{1,8}(?P<rate>\d+(?:[.,]\d+)?)\W{0,4}(?:hz\b|$)",
     re.IGNORECASE,
 )
-"""A rate that a line above the header tells."""
+"""A rate that a line above the header shows."""
 
 _ONE_BY_ONE: Final = 0.9
 """Part of the rows whose number follows that of the row before [-]."""
@@ -94,7 +94,7 @@ class DraftTime:
     unit : suffix of its unit; empty for a text and for a number of rows
     format : "clock", "iso" or a `strptime` format; empty for numbers
     seconds : (n,) the time [s]; of rows that are counted, their number
-    doubts : what is not sure, one sentence each
+    questions : what is not sure, one sentence each
     row_rate : rows per second of a time that counts rows [Hz], NaN where it is not known; None
         for a clock
     guessed : whether the log does not state its unit
@@ -105,18 +105,18 @@ class DraftTime:
     unit: str
     format: str
     seconds: Floats
-    doubts: list[str] = field(default_factory=list)
+    questions: list[str] = field(default_factory=list)
     row_rate: float | None = None
     guessed: bool = False
 
 
 def is_number(cell: str) -> bool:
-    """Tell whether a cell is a number, with a point or a comma."""
+    """Return whether a cell is a number, with a point or a comma."""
     return _NUMBER.match(cell) is not None
 
 
 def is_clock(cell: str) -> bool:
-    """Tell whether a cell is a time of day, such as 08:14:02.610."""
+    """Return whether a cell is a time of day, such as 08:14:02.610."""
     return _CLOCK.match(cell) is not None
 
 
@@ -127,7 +127,7 @@ def find_times(raw: RawTable, units: Mapping[str, str], above: Sequence[str]) ->
     ----------
     raw : the table
     units : suffixes that a row of the file states, by column
-    above : lines above the header, which may tell a rate
+    above : lines above the header, which may show a rate
 
     Returns
     -------
@@ -143,7 +143,7 @@ def find_times(raw: RawTable, units: Mapping[str, str], above: Sequence[str]) ->
         t for k in range(len(raw.names)) if (t := _likely_time(raw, k, units)) is not None
     ]
     if not found:
-        return [_counted(raw, _told_rate(above))]
+        return [_counted(raw, _stated_rate(above))]
     minutes = [t for t in found if counts_minutes(t.column)]
     if len(minutes) == len(found) and (other := _beside_minutes(raw, minutes[0])) is not None:
         found.append(other)
@@ -185,8 +185,8 @@ def _beside_minutes(raw: RawTable, minutes: DraftTime) -> DraftTime | None:
             finest = float(np.median(steps[steps > 0.0]))
             off = np.abs(np.diff(seconds[turns]) - passed)
             if np.all(steps >= 0.0) and np.all(off <= 2.0 * finest + _EVEN * passed):
-                doubt = f"{name!r} is taken for the time: it goes on with {minutes.column!r}"
-                return DraftTime(name, index, unit, "", seconds, [doubt], guessed=True)
+                question = f"{name!r} is taken for the time: it goes on with {minutes.column!r}"
+                return DraftTime(name, index, unit, "", seconds, [question], guessed=True)
     return None
 
 
@@ -231,19 +231,19 @@ def by_motion(times: list[DraftTime], swing: float) -> list[DraftTime]:
         if time.row_rate is not None or hurry(time) <= _FASTEST:
             judged.append(time)
             continue
-        doubt = (
+        question = (
             f"by {time.column!r} in {time.unit or 'seconds'} the speed changes by "
             f"{hurry(time):.0f} m/s^2 in the mean, as no vehicle's does"
         )
         if time.guessed and time.unit == "s" and hurry(time, 60.0) <= _FASTEST:
-            doubt += "; taken as minutes"
+            question += "; taken as minutes"
             time = replace(time, unit="min", seconds=60.0 * time.seconds)
-        judged.append(replace(time, doubts=[*time.doubts, doubt]))
+        judged.append(replace(time, questions=[*time.questions, question]))
     fit = [t for t in judged if t.row_rate is not None or hurry(t) <= _FASTEST]
     best, *others = fit + [t for t in judged if not any(t is f for f in fit)]
     if others:
         names = column_list(t.column for t in others)
-        best.doubts.append(f"{best.column!r} is taken for the time, not {names}")
+        best.questions.append(f"{best.column!r} is taken for the time, not {names}")
     return [best, *others]
 
 
@@ -260,13 +260,13 @@ def _counted(raw: RawTable, rate: float) -> DraftTime:
     name = raw.names[index] if index >= 0 else ""
     rows = raw.numbers(index)[0] if index >= 0 else np.arange(raw.rows, dtype=np.float64)
     what = f"{name!r} counts rows" if name else "no column can be its time"
-    doubt = (
+    question = (
         f"{what}, and the log does not tell how many there are per second: state rate_hz in [time]"
         if np.isnan(rate)
-        else f"{what}; {rate:g} per second, as a line above the header tells"
+        else f"{what}; {rate:g} per second, as a line above the header states"
     )
-    doubt += "" if name else ", where its rows are even, else the time's column"
-    return DraftTime(name, index, "", "", rows, [doubt], rate)
+    question += "" if name else ", where its rows are even, else the time's column"
+    return DraftTime(name, index, "", "", rows, [question], rate)
 
 
 def _counts(raw: RawTable, index: int) -> bool:
@@ -281,10 +281,10 @@ def _counts(raw: RawTable, index: int) -> bool:
     return bool(np.all(steps >= 1.0) and np.mean(steps == 1.0) > _ONE_BY_ONE)
 
 
-def _told_rate(above: Sequence[str]) -> float:
-    """Rate that a line above the header tells [Hz]; NaN where none does."""
+def _stated_rate(above: Sequence[str]) -> float:
+    """Rate that a line above the header shows [Hz]; NaN where none does."""
     for line in above:
-        found = _TOLD_RATE.search(line.strip().strip(",;\t"))
+        found = _STATED_RATE.search(line.strip().strip(",;\t"))
         if found is not None and (rate := float(found["rate"].replace(",", "."))) > 0.0:
             return rate
     return float("nan")
@@ -301,7 +301,7 @@ def _likely_time(raw: RawTable, index: int, units: Mapping[str, str]) -> DraftTi
     known = found.seconds[np.isfinite(found.seconds)]
     if known.size < 2 or known[-1] <= known[0] or np.mean(np.diff(known) >= 0.0) < RISES:
         return None
-    found.doubts.append(f"{found.column!r} is taken for the time, for it rises as one")
+    found.questions.append(f"{found.column!r} is taken for the time, for it rises as one")
     return found
 
 
@@ -329,7 +329,7 @@ def _as_time(raw: RawTable, index: int, units: Mapping[str, str]) -> DraftTime |
     known = values[np.isfinite(values)]
     if known.size < 2 or known[-1] <= known[0]:
         return None
-    doubts = []
+    questions = []
     guessed = False
     stated, _ = unit_of(name)
     if stated is None and name in units:
@@ -339,20 +339,20 @@ def _as_time(raw: RawTable, index: int, units: Mapping[str, str]) -> DraftTime |
     elif counts_minutes(name):
         unit = "min"
     else:
-        unit, doubt = guessed_time_unit(name, known)
-        doubts += [doubt.text] if doubt is not None else []
-        guessed = doubt is not None
+        unit, question = guessed_time_unit(name, known)
+        questions += [question.text] if question is not None else []
+        guessed = question is not None
     if counts_minutes(name):
-        doubts.append(
+        questions.append(
             f"{name!r} counts whole minutes, and is no clock of the rows: record a time with each "
             "row, or state rate_hz in [time] where the rows are even"
         )
     seconds = values * UNITS[unit].factor
-    return DraftTime(name, index, unit, "", seconds, doubts, guessed=guessed)
+    return DraftTime(name, index, unit, "", seconds, questions, guessed=guessed)
 
 
 def guessed_time_unit(name: str, values: Floats) -> tuple[str, Problem | None]:
-    """Unit of a time in numbers, by its size and its steps, and a doubt."""
+    """Unit of a time in numbers, by its size and its steps, and a question."""
     usual = float(np.median(np.abs(values)))
     for least, unit in _EPOCHS:
         if usual >= least:
@@ -373,14 +373,14 @@ def guessed_time_unit(name: str, values: Floats) -> tuple[str, Problem | None]:
 
 def _text_time(raw: RawTable, index: int, texts: Sequence[str]) -> DraftTime | None:
     name = raw.names[index]
-    form, doubts = text_time_format(texts)
+    form, questions = text_time_format(texts)
     if not form:
         return None
     try:
         seconds, _, _ = time_seconds(raw, index, 1.0, form)
     except DriveError:
         return None
-    return DraftTime(name, index, "", form, seconds, [doubt.text for doubt in doubts])
+    return DraftTime(name, index, "", form, seconds, [question.text for question in questions])
 
 
 def text_time_format(texts: Sequence[str]) -> tuple[str, list[Problem]]:
@@ -393,7 +393,7 @@ def text_time_format(texts: Sequence[str]) -> tuple[str, list[Problem]]:
     Returns
     -------
     format : empty where they are no times, or numbers
-    doubts : what is not sure
+    questions : what is not sure
     """
     if not texts:
         return "", []
@@ -402,10 +402,10 @@ def text_time_format(texts: Sequence[str]) -> tuple[str, list[Problem]]:
     if _most(_ISO.match(t) is not None for t in texts):
         return "iso", []
     fits = [f for f in DATE_FORMATS if _fits(texts, f)]
-    doubts = []
+    questions = []
     if len(fits) > 1 and {f[:5] for f in fits} >= {"%d/%m", "%m/%d"}:
-        doubts.append(Problem.of("clock.day_first", time=texts[0]))
-    return (fits[0] if fits else ""), doubts
+        questions.append(Problem.of("clock.day_first", time=texts[0]))
+    return (fits[0] if fits else ""), questions
 
 
 def _most(fits: Iterable[bool]) -> bool:

@@ -61,31 +61,33 @@ def unit_in_name(name: str, stated: str | None) -> str:
 
 
 def with_judged_units(
-    columns: tuple[DraftColumn, ...], told: Mapping[str, Values]
+    columns: tuple[DraftColumn, ...], reported: Mapping[str, Values]
 ) -> tuple[DraftColumn, ...]:
     """Give the speeds without a stated unit the one that their values and others show.
 
     Parameters
     ----------
     columns : of the log
-    told : what the log holds, by its names; columns that are nothing to a drive too
+    reported : what the log holds, by its names; columns that are nothing to a drive too
     """
     by_quantity = {c.quantity: c for c in columns if c.quantity}
     place = tuple(by_quantity.get(q) for q in ("latitude", "longitude"))
     judged = []
     for column in columns:
         if column.quantity in ("vehicle_speed", "gnss_speed") and not column.stated:
-            speed = told[column.name]
+            speed = reported[column.name]
             fixes = None
             if place[0] is not None and place[1] is not None:
                 fixes = tuple(
-                    (told[c.name].time, to_si(told[c.name].values, c.unit)) for c in place if c
+                    (reported[c.name].time, to_si(reported[c.name].values, c.unit))
+                    for c in place
+                    if c
                 )
-            others = {n: v for n, v in told.items() if n != column.name and v.unit in SPEEDS}
+            others = {n: v for n, v in reported.items() if n != column.name and v.unit in SPEEDS}
             unit, why = _judged(speed, fixes, others)
             if unit:
-                doubt = f"states no unit; taken as {unit}, for {why}"
-                column = replace(column, unit=unit, doubt=doubt)
+                question = f"states no unit; taken as {unit}, for {why}"
+                column = replace(column, unit=unit, question=question)
         judged.append(column)
     return tuple(judged)
 

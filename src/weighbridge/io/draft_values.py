@@ -2,7 +2,7 @@
 
 A name may fit where the values do not: the battery of 12 V is no traction battery, and a pressure
 over that of the air is none of the manifold. And a unit with values that move as a vehicle's do
-tells what a name does not.
+shows what a name does not.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _BELOW: Final = 0.2
 """Part of the values of a pressure that may lie below: sensors fail now and then [-]."""
 
 FOUND: Final = ("vehicle_speed", "engine_speed", "mass_air_flow")
-"""Quantities that a unit and the values may tell without a name."""
+"""Quantities that a unit and the values may show without a name."""
 
 _FEWEST: Final = 20
 """Rows in which something is to be seen."""
@@ -74,18 +74,18 @@ gears are changed, and in overrun little air flows [-]."""
 
 
 def with_judged_values(
-    columns: tuple[DraftColumn, ...], told: Mapping[str, Values]
+    columns: tuple[DraftColumn, ...], reported: Mapping[str, Values]
 ) -> tuple[DraftColumn, ...]:
-    """Judge what columns are taken for by their values, and find what names do not tell.
+    """Judge what columns are taken for by their values, and find what names do not show.
 
     Parameters
     ----------
     columns : of one log
-    told : what the log holds in numbers, by its names
+    reported : what the log holds in numbers, by its names
     """
-    columns = tuple(_without_gauge(c, told) for c in _on_board(columns))
+    columns = tuple(_without_gauge(c, reported) for c in _on_board(columns))
     for quantity, fits in zip(FOUND, (_moves, _turns, _breathes), strict=True):
-        columns = _found_by_unit(columns, told, quantity, fits)
+        columns = _found_by_unit(columns, reported, quantity, fits)
     return columns
 
 
@@ -112,11 +112,11 @@ def _on_board(columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, ...]:
     return tuple(found)
 
 
-def _without_gauge(column: DraftColumn, told: Mapping[str, Values]) -> DraftColumn:
+def _without_gauge(column: DraftColumn, reported: Mapping[str, Values]) -> DraftColumn:
     """Take no pressure over that of the air, and no number, for the pressure of the manifold."""
-    if column.quantity != "intake_pressure" or column.name not in told:
+    if column.quantity != "intake_pressure" or column.name not in reported:
         return column
-    values = told[column.name].values
+    values = reported[column.name].values
     values = values[np.isfinite(values)]
     if not column.stated and values.size >= _FEWEST and np.ptp(values) == 0.0:
         return _nothing(column, "states no unit and never changes, as the number of a map")
@@ -128,13 +128,13 @@ def _without_gauge(column: DraftColumn, told: Mapping[str, Values]) -> DraftColu
 
 def _nothing(column: DraftColumn, why: str) -> DraftColumn:
     """Take a column for nothing, and say why."""
-    doubt = f"not taken for {column.quantity}: it {why}"
-    return replace(column, quantity="", unit="", stated=False, doubt=doubt, unsure=False)
+    question = f"not taken for {column.quantity}: it {why}"
+    return replace(column, quantity="", unit="", stated=False, question=question, unsure=False)
 
 
 def _found_by_unit(
     columns: tuple[DraftColumn, ...],
-    told: Mapping[str, Values],
+    reported: Mapping[str, Values],
     quantity: str,
     fits: Callable[[Values, Mapping[str, Values]], bool],
 ) -> tuple[DraftColumn, ...]:
@@ -146,20 +146,20 @@ def _found_by_unit(
     if quantity in taken or (quantity == "vehicle_speed" and "gnss_speed" in taken):
         return columns
     dimension = UNITS[QUANTITIES[quantity].suffix].dimension
-    known = {c.quantity: told[c.name] for c in columns if c.quantity and c.name in told}
+    known = {c.quantity: reported[c.name] for c in columns if c.quantity and c.name in reported}
     fitting = [
         c
         for c in columns
         if not c.quantity
-        and c.name in told
-        and told[c.name].unit in UNITS
-        and UNITS[told[c.name].unit].dimension == dimension
+        and c.name in reported
+        and reported[c.name].unit in UNITS
+        and UNITS[reported[c.name].unit].dimension == dimension
         and not means_another(c.name, quantity)
-        and fits(told[c.name], known)
+        and fits(reported[c.name], known)
     ]
-    if not fitting or not _alike([told[c.name] for c in fitting]):
+    if not fitting or not _alike([reported[c.name] for c in fitting]):
         return columns
-    values = told[fitting[0].name]
+    values = reported[fitting[0].name]
     there = values.values[np.isfinite(values.values)]
     low, usual, high = map(float, np.quantile(there, (0.0, 0.5, 1.0)))
     found = replace(
@@ -172,7 +172,7 @@ def _found_by_unit(
         high=high,
         count=int(there.size),
         rows=np.isfinite(values.values),
-        doubt=f"its name is not known; taken for {quantity} by its unit and by how it moves",
+        question=f"its name is not known; taken for {quantity} by its unit and by how it moves",
         unsure=True,
     )
     return tuple(found if c is fitting[0] else c for c in columns)

@@ -1,4 +1,4 @@
-"""Patterns of file names that tell the kinds of file of a drive apart, on other days too."""
+"""Patterns of file names that distinguish the kinds of file of a drive, on other days too."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _DIGITS: Final = 3
 
 
 def file_patterns(kinds: Sequence[Sequence[str]], others: Sequence[str] = ()) -> list[str]:
-    """Patterns that tell the kinds of file of a drive apart, and fit those of other drives.
+    """Patterns that distinguish the kinds of file of a drive, and fit those of other drives.
 
     What all names share before and after what differs, such as a date, may be anything, and so
     may a date, a time or a running number of each.
@@ -27,7 +27,7 @@ def file_patterns(kinds: Sequence[Sequence[str]], others: Sequence[str] = ()) ->
     ----------
     kinds : names of the files of each kind
     others : names of files that are of no kind, such as those that cannot be read; where a date
-        alone tells one from a file of a kind, that kind's pattern may fit it
+        alone shows one from a file of a kind, that kind's pattern may fit it
 
     Returns
     -------

@@ -39,7 +39,7 @@ class Format:
     read : reads one file
     about : what is read of it, one line for people
     takes : what of a mapping it can use
-    begins : tells by a file's first bytes (4096 of them) that it is of this format; None where
+    begins : shows by a file's first bytes (4096 of them) that it is of this format; None where
         the suffix decides
     magic : whether ``begins`` knows the format under any suffix
     self_described : whether it names quantities and units itself, so that a mapping of the
@@ -92,7 +92,7 @@ class Format:
 
 
 def _parted(stem: str, suffix: str) -> bool:
-    """Whether a suffix stands for itself: after a name by its dot, or as a word of its own."""
+    """Whether a suffix means itself: after a name by its dot, or as a word of its own."""
     return bool(stem) if suffix.startswith(".") else not stem[-1:].isalnum()
 
 

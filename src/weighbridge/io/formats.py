@@ -334,7 +334,7 @@ def suffixes() -> tuple[str, ...]:
 
 
 def is_log(path: Path) -> bool:
-    """Tell by its name whether a file is read as a log."""
+    """Return by its name whether a file is read as a log."""
     return any(f.ends(path.name) for f in formats())
 
 
@@ -384,8 +384,8 @@ def unreadable(path: Path) -> str:
         remedy = _of_text(path) or remedy
     near = difflib.get_close_matches(suffix, [s for s in suffixes() if s.startswith(".")], n=1)
     known = f"the nearest that is known is {near[0]}" if near and not remedy else ""
-    told = known or remedy or f"known are {', '.join(suffixes())}, and folders of tables"
-    return f"{path}: logs of kind {path.suffix or 'without a suffix'!r} cannot be read; {told}"
+    reported = known or remedy or f"known are {', '.join(suffixes())}, and folders of tables"
+    return f"{path}: logs of kind {path.suffix or 'without a suffix'!r} cannot be read; {reported}"
 
 
 def _of_text(path: Path) -> str:

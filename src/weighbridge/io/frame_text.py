@@ -120,7 +120,7 @@ class Form:
                             (CELL, self.separator)):  # fmt: skip
             letters[[ord(letter) for letter in those]] = role
         tags = [_tag(word) for word in self.extended.split()]
-        told = len(tags)
+        reported = len(tags)
         rows = []
         for s in self.shapes:
             places = [p for p in (s.id, *s.marks, self.time) if p >= 0]
@@ -141,7 +141,7 @@ class Form:
                 tags += [_tag(word) for word in words.split()]
             rows.append(row + [LACKING, 0, 0] * (MARKS - len(s.marks)))
         return FrameForm(
-            letters, np.array(rows, np.int64), np.array(tags, np.int64), told, self.other,
+            letters, np.array(rows, np.int64), np.array(tags, np.int64), reported, self.other,
             self.time, self.time_words, self.short, self.base, bool(self.separator),
             self.socketcan, self.coded, self.relative, bool(self.dates),
         )  # fmt: skip
@@ -236,7 +236,7 @@ def _number(bus: str, taken: Mapping[str, int]) -> int:
 
 
 def _dates(stamps: Sequence[str], form: str) -> Floats:
-    """Seconds since 1970, where no zone is told by the clock of this computer; NaN of no date."""
+    """Seconds since 1970, where no zone is shown by the clock of this computer; NaN of no date."""
     texts = pl.Series(stamps, dtype=pl.String)
     universal = texts.str.ends_with("Z").any()
     if form == "iso":
@@ -269,7 +269,7 @@ def _blocks(path: Path) -> Iterator[bytes]:
 
 
 def _with_head(head: Callable[[Path, bytes], tuple[int, Form]], path: Path) -> Pieces:
-    """Blocks of the form that the first tells, without the bytes that are its head."""
+    """Blocks of the form that the first shows, without the bytes that are its head."""
     form = None
     for block in _blocks(path):
         if form is None:
@@ -357,7 +357,7 @@ _TRACE_KEY: Final = re.compile(rb"^;\$(?P<key>[A-Z]+)=(?P<value>[^\r\n]*)", re.M
 _NUMBERED: Final = {1: ")"}
 _ONES: Final = "ffffffff"
 _TRACE_VERSIONS: Final[Mapping[str, tuple[int, Shape]]] = {
-    # Version 1.0 tells of the bus under an identifier of ones.
+    # Version 1.0 reports the bus under an identifier of ones.
     "1.0": (2, Shape(3, 5, size=4, marks=_NUMBERED)),
     "1.1": (2, Shape(4, 6, size=5, marks={**_NUMBERED, 3: "rx tx"})),
     "1.3": (2, Shape(5, 8, bus=3, size=7, marks={**_NUMBERED, 4: "rx tx"})),
@@ -402,8 +402,8 @@ def _trace_head(path: Path, block: bytes) -> tuple[int, Form]:
         unit = 1.0 if b"," in stamp or b"." in stamp else 1e-3
         shape = Shape(places["id"], places["data"], size=places["size"])
         return block.find(b"\n") + 1, _trace_form(places["time"], shape, unit)
-    told = {m["key"].upper(): m["value"].strip() for m in _TRACE_KEY.finditer(block)}
-    version = told.get(b"FILEVERSION", b"1.0").decode("latin-1")
+    reported = {m["key"].upper(): m["value"].strip() for m in _TRACE_KEY.finditer(block)}
+    version = reported.get(b"FILEVERSION", b"1.0").decode("latin-1")
     if version not in _TRACE_VERSIONS:
         raise DriveError(
             f"{path} is of TRC version {version}; known are {', '.join(_TRACE_VERSIONS)}: "
@@ -412,7 +412,7 @@ def _trace_head(path: Path, block: bytes) -> tuple[int, Form]:
     time, shape = _TRACE_VERSIONS[version]
     coded = False
     if version.startswith("2"):
-        columns = told.get(b"COLUMNS", b"N,O,T,B,I,d,R,L,D").decode("latin-1").split(",")
+        columns = reported.get(b"COLUMNS", b"N,O,T,B,I,d,R,L,D").decode("latin-1").split(",")
         at = {name: columns.index(name) for name in columns}
         lacking = [n for n in ("O", "T", "I", "D") if n not in at]
         if lacking or not {"l", "L"} & set(at):
@@ -424,7 +424,7 @@ def _trace_head(path: Path, block: bytes) -> tuple[int, Form]:
             marks={at["T"]: shape.marks[2]},
         )  # fmt: skip
     try:
-        days = float(told.get(b"STARTTIME", b"nan"))
+        days = float(reported.get(b"STARTTIME", b"nan"))
     except ValueError:
         days = math.nan
     # Days since the end of 1899.
@@ -448,7 +448,7 @@ def _candump_form(words: int) -> Form:
     bus = words + 2
     front = {0: "(", bus - 1: ")"}
     shapes = []
-    # candump -x tells the direction and two flags before the identifier.
+    # candump -x shows the direction and two flags before the identifier.
     for at, way in ((bus + 4, {bus + 1: "rx tx"}), (bus + 1, {})):
         known = {**front, **way}
         shapes += [
@@ -465,7 +465,7 @@ def _candump_form(words: int) -> Form:
 
 
 def is_candump(head: bytes) -> bool:
-    """Tell whether a text begins with a line of candump."""
+    """Return whether a text begins with a line of candump."""
     return _CANDUMP_LINE.match(head) is not None
 
 
@@ -530,17 +530,17 @@ _BUSMASTER: Final = Form(
 
 
 def is_crtd(head: bytes) -> bool:
-    """Tell whether a text begins with a record of CRTD."""
+    """Return whether a text begins with a record of CRTD."""
     return _CRTD_LINE.match(head) is not None
 
 
 def is_canking(head: bytes) -> bool:
-    """Tell whether a text begins with the header of CanKing's window."""
+    """Return whether a text begins with the header of CanKing's window."""
     return _CANKING_HEAD.match(head) is not None
 
 
 def is_busmaster(head: bytes) -> bool:
-    """Tell whether a text begins as BUSMASTER's logs do."""
+    """Return whether a text begins as BUSMASTER's logs do."""
     return _BUSMASTER_HEAD.match(head) is not None
 
 
@@ -589,7 +589,7 @@ _BOM: Final = b"\xef\xbb\xbf"
 
 
 def is_frame_table(head: bytes) -> bool:
-    """Tell whether a text begins with a table of frames that names its columns."""
+    """Return whether a text begins with a table of frames that names its columns."""
     return _table_header(_head_lines(head)) is not None
 
 

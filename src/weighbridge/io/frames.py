@@ -132,7 +132,8 @@ _WRAPS: Final = tuple(2.0**32 * tick for tick in (1e-6, 1e-5, 1e-3))
 
 
 def settle_clock(frames: Frames, source: str) -> tuple[Frames, list[Problem]]:
-    """Bring frames into the order of time; mend a counter that wrapped, tell a clock that was set.
+    """Bring frames into the order of time; correct a counter that wrapped, find a clock that was
+    set.
 
     Parameters
     ----------
@@ -142,7 +143,7 @@ def settle_clock(frames: Frames, source: str) -> tuple[Frames, list[Problem]]:
     Returns
     -------
     frames : in the order of time; where the clock was set, the longest part between
-    problems : what was mended or left out
+    problems : what was corrected or left out
     """
     problems = []
     time = frames.time

@@ -71,7 +71,7 @@ class _Header:
 
 
 def is_grouped(begin: bytes) -> bool:
-    """Tell whether a text begins as a table with several clocks."""
+    """Return whether a text begins as a table with several clocks."""
     lines = begin.removeprefix(b"\xef\xbb\xbf").decode("utf-8", "replace").splitlines()
     # The last line may be cut off.
     return _header(lines[:-1]) is not None
@@ -216,7 +216,7 @@ def _names(row: Sequence[str], clocks: Sequence[int]) -> bool:
 def _seconds(
     raw: RawTable, place: int, header: _Header, time: TimeColumn, found: Recording
 ) -> Floats:
-    """Times of one clock [s], as a mapping tells or as they look."""
+    """Times of one clock [s], as a mapping shows or as they look."""
     name, form = header.names[place], time.format or ""
     column = raw.column(place)
     if not form and not column.dtype.is_numeric():

@@ -39,7 +39,7 @@ _TYPES: Final = {
 
 
 def is_haltech(begin: bytes) -> bool:
-    """Tell whether a text begins as Haltech's logs do."""
+    """Return whether a text begins as Haltech's logs do."""
     return begin.removeprefix(b"\xef\xbb\xbf").startswith(_MARK)
 
 

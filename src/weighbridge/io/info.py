@@ -40,7 +40,7 @@ def read_info(path: Path) -> DriveInfo:
 
 
 def parse_info(text: str, name: str) -> DriveInfo:
-    """Read the text of a ``drive.toml`` that stands in ``name``.
+    """Read the text of a ``drive.toml`` that is in ``name``.
 
     Raises
     ------

@@ -44,7 +44,7 @@ class Spn:
     ----------
     number : SPN
     name : canonical quantity, or a word for what has none
-    pgn : parameter group it stands in
+    pgn : parameter group it is in
     byte : first byte, counted from 1 as the standard does
     bit : first bit in it, counted from 1
     bits : length
@@ -110,7 +110,7 @@ SWITCHES: Final = {
 """Switches, and the parameters of which any says that one is pressed."""
 
 _PARK: Final = 0xFB
-"""SPN 523: a gearbox in park is told by a code above the range of gears."""
+"""SPN 523: a gearbox in park is shown by a code above the range of gears."""
 
 # Friction changes with engine speed and heat; older than this it says nothing.
 FRICTION_AGE: Final = 5.0
@@ -164,7 +164,7 @@ def parameter_group(identifier: NDArray[np.uint32]) -> NDArray[np.uint32]:
 
 
 def is_j1939(frames: Frames) -> bool:
-    """Tell whether there is J1939 traffic: two of the groups known, in 8-byte frames.
+    """Return whether there is J1939 traffic: two of the groups known, in 8-byte frames.
 
     One known group alone may be a car's own 29-bit identifier.
     """
@@ -176,7 +176,7 @@ def decode_j1939(frames: Frames, name: str = "J1939") -> J1939:
     """Decode the parameter groups of `SPNS`.
 
     Net engine torque is actual (SPN 513) less nominal friction (SPN 514) less
-    parasitic losses (SPN 2978, where told), in parts of the reference torque
+    parasitic losses (SPN 2978, where reported), in parts of the reference torque
     (SPN 544). The brake counts as pressed where any of the brake switches, the
     brake pedal or a retarder says so. The clutch counts as pressed while the
     gearbox shifts or has the driveline open.
@@ -278,22 +278,22 @@ class _Reader:
 
     def pressed(self, name: str, spns: Sequence[str]) -> Signal | None:
         """One switch of several: pressed where any says so, each holding its last value."""
-        told = []
+        reported = []
         for spn in spns:
             for _, time, values in self.senders(SPN[spn]):
                 on = is_pressed(spn, values)
                 signal, problems = clean_signal(name, time, on.astype(np.float64), self.name)
                 self.summary.problems += problems
                 if signal is not None:
-                    told.append(signal)
-        if not told:
+                    reported.append(signal)
+        if not reported:
             return None
         self.summary.sources[name] = -1
-        time = np.unique(np.concatenate([s.time for s in told]))
-        on = np.array([np.nan_to_num(s.held(time)) for s in told]).max(axis=0)
+        time = np.unique(np.concatenate([s.time for s in reported]))
+        on = np.array([np.nan_to_num(s.held(time)) for s in reported]).max(axis=0)
         # Senders that speak one shortly after another say nothing new, and would look like a
         # fast clock full of gaps: the one that says most gives the clock, others where they differ.
-        most = max(told, key=len)
+        most = max(reported, key=len)
         news = np.diff(on, prepend=np.nan) != 0.0
         kept = news | np.isin(time, most.time) | ~(most.age(time) <= 2.0 * most.period)
         return Signal(name, time[kept], on[kept])
@@ -343,8 +343,8 @@ def spn_values(part: Frames, spn: Spn) -> Floats:
 def _net_torque(reader: _Reader) -> list[Signal]:
     """Net torque fraction: actual less friction and parasitic losses.
 
-    Where no friction is told, the indicated torque under both names, so that its friction is not
-    forgotten.
+    Where no friction is reported, the indicated torque under both names, so that its friction is
+    not forgotten.
     """
     actual = reader.best("actual_torque")
     reader.summary.sources.pop("actual_torque", None)
@@ -367,8 +367,8 @@ def _net_torque(reader: _Reader) -> list[Signal]:
     reader.summary.sources.pop("parasitic_torque", None)
     if parasitic is not None:
         # A controller that does not know it sends its lowest code, -125 %.
-        told = np.interp(actual.time, parasitic.time, parasitic.values)
-        lost = lost + np.where(told > 0.0, told, 0.0)
+        reported = np.interp(actual.time, parasitic.time, parasitic.values)
+        lost = lost + np.where(reported > 0.0, reported, 0.0)
     near = friction.age(actual.time) <= FRICTION_AGE
     if not near.all():
         reader.note(
@@ -430,7 +430,7 @@ def _check_distance(reader: _Reader, signals: list[Signal]) -> None:
 
 
 def _tell_weights(reader: _Reader) -> None:
-    """Tell the weights the vehicle itself reports: a hint, never a known mass."""
+    """Return the weights the vehicle itself reports: a hint, never a known mass."""
     gross = reader.best("combination_weight")
     reader.summary.sources.pop("combination_weight", None)
     if gross is not None:

@@ -37,7 +37,7 @@ _LOOKED_AT: Final = 200
 
 
 def is_json_lines(head: bytes) -> bool:
-    """Tell whether a text has an object on each of its first lines, or is a list of objects."""
+    """Return whether a text has an object on each of its first lines, or is a list of objects."""
     text = head.removeprefix(b"\xef\xbb\xbf")
     if _LIST.match(text):
         return True

@@ -88,8 +88,8 @@ def physical_of(raw: Floats, converted: np.ndarray) -> tuple[Floats, int]:
     values = np.full(kinds.size, np.nan)
     texts: dict[float, str] = {}
     for k, at in enumerate(first.tolist()):
-        told = converted[at]
-        text = told.decode("utf-8", "replace") if isinstance(told, bytes) else str(told)
+        reported = converted[at]
+        text = reported.decode("utf-8", "replace") if isinstance(reported, bytes) else str(reported)
         try:
             values[k] = float(text)
         except ValueError:

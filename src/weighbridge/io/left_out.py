@@ -25,7 +25,7 @@ _OWN: Final = ("std_kg", "sprung_mass_std_kg", "payload_low95_kg")
 
 
 def left_out(folder: Path, files: Sequence[Path], mapping: str) -> Iterator[Problem]:
-    """Tell of tables that no one has described.
+    """Report tables that no one has described.
 
     Parameters
     ----------

@@ -25,8 +25,8 @@ class Log:
         another file of the drive has it
     absolute : whether the clock counts from 1970
     start : where the clock begins [s since 1970], if it does not count from there
-        and the file tells; None otherwise
-    of_day : whether the clock counts from midnight, of a day that the file does not tell
+        and the file shows; None otherwise
+    of_day : whether the clock counts from midnight, of a day that the file does not show
     placed : whether a mapping gives the offset of its clock
     align : whether a mapping asks to align its clock with the drive's other files
     frames : raw bus traffic, decoded once all files of a drive are read

@@ -79,7 +79,7 @@ _MOST: Final = 12
 
 
 _DAMAGED: Final = 0.005
-"""Part of the rows that a word stands in at most which a torn line left [-]."""
+"""Part of the rows that a word is in at most which a torn line left [-]."""
 
 # Rows by which it is known what a column of texts names, and part of the names that are known.
 _LOOKED_AT: Final = 200
@@ -95,16 +95,16 @@ def _place(names: list[str], among: frozenset[str] | tuple[str, ...]) -> int | N
 
 
 def _places(names: list[str], rows: Sequence[Sequence[str]]) -> tuple[int | None, int | None]:
-    """Columns of names and of values: by what they are called, else by what stands in them."""
+    """Columns of names and of values: by what they are called, else by what is in them."""
     named, valued = _place(names, _NAMES), _place(names, _VALUES)
-    told = [row for row in rows if len(row) == len(names)]
-    if named is None and told:
-        named = next((k for k in range(len(names)) if _names_quantities(told, k)), None)
-    if valued is None and named is not None and told:
+    reported = [row for row in rows if len(row) == len(names)]
+    if named is None and reported:
+        named = next((k for k in range(len(names)) if _names_quantities(reported, k)), None)
+    if valued is None and named is not None and reported:
         timed = _time_place(names, rows)
         places = [k for w in _PLACES.values() if (k := _place(names, w)) is not None]
         free = (k for k in range(len(names)) if k not in (named, timed, *places))
-        numeric = [k for k in free if all(is_number(row[k]) for row in told)]
+        numeric = [k for k in free if all(is_number(row[k]) for row in reported)]
         valued = numeric[0] if len(numeric) == 1 else None
     return named, valued
 
@@ -124,13 +124,13 @@ def _time_place(names: list[str], rows: Sequence[Sequence[str]] = ()) -> int | N
     place = next(named, None)
     if place is not None or not rows:
         return place
-    told = [row for row in rows if len(row) == len(names)]
-    columns = ([row[k] for row in told if row[k]] for k in range(len(names)))
+    reported = [row for row in rows if len(row) == len(names)]
+    columns = ([row[k] for row in reported if row[k]] for k in range(len(names)))
     return next((k for k, cells in enumerate(columns) if text_time_format(cells)[0]), None)
 
 
 def is_long(head: bytes) -> bool:
-    """Tell whether a text begins with the header of a long table."""
+    """Return whether a text begins with the header of a long table."""
     lines = head.removeprefix(b"\xef\xbb\xbf").decode("utf-8", "replace").split("\n")
     separator = max(SEPARATORS, key=lines[0].count)
     # The last line may be cut off.
@@ -139,7 +139,7 @@ def is_long(head: bytes) -> bool:
 
 
 def are_long(names: list[str], rows: Sequence[Sequence[str]] = ()) -> bool:
-    """Tell whether columns are those of a long table.
+    """Return whether columns are those of a long table.
 
     Parameters
     ----------
@@ -229,9 +229,9 @@ def _some(raw: RawTable) -> list[list[str]]:
 
 
 def _of_one_vehicle(raw: RawTable, names: list[str]) -> pl.Series | None:
-    """Tell which rows are of the one vehicle of a table; None where none is named.
+    """Return which rows are of the one vehicle of a table; None where none is named.
 
-    A name that stands in hardly any row is damage.
+    A name that is in hardly any row is damage.
 
     Raises
     ------
@@ -241,8 +241,8 @@ def _of_one_vehicle(raw: RawTable, names: list[str]) -> pl.Series | None:
     place = _place(names, _VEHICLES)
     if place is None:
         return None
-    told = raw.column(place).cast(pl.String).str.strip_chars()
-    counts = told.drop_nulls().value_counts(sort=True)
+    reported = raw.column(place).cast(pl.String).str.strip_chars()
+    counts = reported.drop_nulls().value_counts(sort=True)
     vehicles = [name for name, count in counts.rows() if not _is_damage(count, raw.rows)]
     if len(vehicles) > 1:
         raise refused(
@@ -252,18 +252,18 @@ def _of_one_vehicle(raw: RawTable, names: list[str]) -> pl.Series | None:
             column=names[place],
             example=vehicles[0],
         )
-    return (told.is_null() | told.is_in(vehicles)) if vehicles else None
+    return (reported.is_null() | reported.is_in(vehicles)) if vehicles else None
 
 
 def _is_damage(count: int, rows: int) -> bool:
-    """Whether what stands in so many of the rows is no word of the logger, but a torn one."""
+    """Whether what is in so many of the rows is no word of the logger, but a torn one."""
     return count <= max(1.0, _DAMAGED * rows)
 
 
 def _channel(path: Path, name: str, rows: pl.DataFrame, notes: list[Problem | str]) -> Channel:
     """Values of one name, all in the unit that most of its rows state.
 
-    A unit that stands in hardly any row and does not convert is damage; the row is left out.
+    A unit that is in hardly any row and does not convert is damage; the row is left out.
     """
     stated = rows["unit"].fill_null("").str.strip_chars()
     units = (
@@ -293,7 +293,7 @@ def _channel(path: Path, name: str, rows: pl.DataFrame, notes: list[Problem | st
 
 
 def _seconds(raw: RawTable, names: list[str], time: TimeColumn, found: Recording) -> Floats:
-    """Times of the rows [s], as a mapping tells or as they look."""
+    """Times of the rows [s], as a mapping shows or as they look."""
     if time.rate is not None:
         raise DriveError(
             f"{raw.path} has one row for each value, so that rate_hz in [time] of the mapping is "

@@ -29,7 +29,7 @@
     offset = 0.0
     optional = true                  # may be absent; else `weigh` refuses a drive without it
     valid = "AccValid"               # values count only where this signal is not 0; CAN only
-    trusted = true                   # right as it is: a doubt of `inspect` is no refusal of `weigh`
+    trusted = true                   # right as it is, whatever `inspect` says
 
 A drive of several kinds of file has one ``[tables.NAME]`` per kind, with
 ``files = "pattern*.csv"`` and the same sections inside. A file that needs no
@@ -154,7 +154,7 @@ def load_mapping(source: MappingSource) -> tuple[TableMapping, ...]:
     Raises
     ------
     ConfigError
-        The file, keys or values cannot be used; all that is wrong is told at once.
+        The file, keys or values cannot be used; all that is wrong is reported at once.
     """
     if isinstance(source, Mapping):
         check_texts("keys of mapping", source)
@@ -244,8 +244,8 @@ def _table(root: Section, files: str) -> TableMapping:
         time = _time(root.section("time"))
     section = root.section("signals")
     own_names = time == TimeColumn(offset=time.offset, align=time.align)
-    told = time != TimeColumn() or text != TextFormat() or bool(faults.said)
-    alone = section is None and own_names and told
+    reported = time != TimeColumn() or text != TextFormat() or bool(faults.said)
+    alone = section is None and own_names and reported
     signals: list[MappedSignal] = []
     if not alone and (section is None or not section.data):
         with faults.gathered():
@@ -302,7 +302,7 @@ def _text_format(section: Section | None) -> TextFormat:
 
 
 def _is_encoding(name: str) -> bool:
-    """Tell whether text tables may be in an encoding: some of Python's turn no text into bytes."""
+    """Return whether text tables may be in an encoding; some of Python's take no text."""
     try:
         return _CELLS.encode(name).decode(name) == _CELLS
     except (LookupError, ValueError):
@@ -418,7 +418,7 @@ def how_to_name(path: Path) -> str:
 
 
 def lacking(where: str, signal: MappedSignal, source: str, hint: str = "") -> Problem:
-    """Tell of a signal that is named and not there.
+    """Report a signal that is named and not there.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""A drafted mapping as the text of a TOML file, with what is doubtful in its comments."""
+"""A drafted mapping as the text of a TOML file, with what is questionable in its comments."""
 
 from __future__ import annotations
 
@@ -71,8 +71,8 @@ def _csv(text: TextFormat) -> Table:
 
 def _time(one: Draft) -> Table:
     table = tomlkit.table()
-    for doubt in one.doubts:
-        table.add(tomlkit.comment(visible(doubt)))
+    for question in one.questions:
+        table.add(tomlkit.comment(visible(question)))
     if one.time:
         table.add("column", one.time)
     if one.time_unit:
@@ -96,8 +96,8 @@ def _signal(column: DraftColumn) -> Table:
     quantity = QUANTITIES[column.quantity]
     seen = f"{quantity.meaning}; {column.low:.4g} to {column.high:.4g}"
     table.add(tomlkit.comment(visible(f"{seen} {column.unit}".rstrip())))
-    if column.doubt:
-        table.add(tomlkit.comment(visible(f"doubtful: {column.doubt}")))
+    if column.question:
+        table.add(tomlkit.comment(visible(f"doubtful: {column.question}")))
     table.add("column", column.name)
     if column.unit:
         table.add("unit", column.unit)

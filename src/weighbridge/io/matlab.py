@@ -105,7 +105,7 @@ def _check_deflated(path: Path) -> None:
                 try:
                     size += len(stream.decompress(packed))
                 except zlib.error:
-                    # What is damaged the library tells in its words.
+                    # What is damaged the library shows in its words.
                     return
                 check_unpacked(path, size)
             file.seek(after)
@@ -181,7 +181,7 @@ def _elements(structures: Any) -> list[dict[str, Any]]:
     if not isinstance(names, list):
         return []
     return [
-        {key: told[k] for key, told in structures.items() if len(told) == len(names)}
+        {key: reported[k] for key, reported in structures.items() if len(reported) == len(names)}
         for k in range(len(names))
     ]
 

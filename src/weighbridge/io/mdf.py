@@ -35,7 +35,7 @@ from weighbridge.io.mapping import (
     resolved_unit,
 )
 from weighbridge.io.mdf_bus import bus_frames
-from weighbridge.io.mdf_mend import Mended, guard, mended, settle
+from weighbridge.io.mdf_repair import Repaired, corrected, guard, settle
 from weighbridge.io.naming import recognise_all
 from weighbridge.io.table import column_list
 from weighbridge.messages import phrase
@@ -66,7 +66,7 @@ def read_mdf(path: Path, table: str | None, mapping: TableMapping | None) -> Log
     with _file(path) as (file, kept):
         log = _read(file, path, table, mapping)
     if kept:
-        log.problems.insert(0, _told(log, kept))
+        log.problems.insert(0, _reported(log, kept))
     return log
 
 
@@ -111,7 +111,7 @@ def draft(path: Path) -> Draft:
     if not found.channels and found.frames is not None:
         raise DriveError(
             f"{path} holds CAN frames only: give the DBC of their signals with --dbc; OBD-II and "
-            "J1939 are read without one (weighbridge inspect tells)"
+            "J1939 are read without one (weighbridge inspect shows)"
         )
     return draft_of(path, found)
 
@@ -124,7 +124,7 @@ def _file(path: Path) -> Iterator[tuple[Any, str]]:
     except ImportError:
         raise MissingExtraError("asammdf", "mdf", f"reading {path.name}") from None
     try:
-        saved = mended(path)
+        saved = corrected(path)
     except ValueError as e:
         raise _unreadable(path, str(e)) from None
     with (
@@ -135,20 +135,21 @@ def _file(path: Path) -> Iterator[tuple[Any, str]]:
         warnings.simplefilter("ignore")
         file, kept = _open(MDF, path, saved, folder)
         with file:
-            told = ""
+            reported = ""
             if saved is not None and saved.damaged:
                 if not kept and not saved.unfinished:
-                    records = f"of its {saved.told} records none" if saved.told else "nothing"
+                    of = saved.reported
+                    records = f"of its {of} records none" if of else "nothing"
                     raise DriveError(
                         f"{path} ends early or is damaged, and {records} is whole; copy it again"
                     )
-                told = phrase("what_is_left")
-                if saved.told:
-                    told = phrase("kept_records", kept=kept, records=saved.told)
-            yield file, told
+                reported = phrase("what_is_left")
+                if saved.reported:
+                    reported = phrase("kept_records", kept=kept, records=saved.reported)
+            yield file, reported
 
 
-def _told(log: Log, kept: str) -> Problem:
+def _reported(log: Log, kept: str) -> Problem:
     """Say what was salvaged of a file that was cut off."""
     clocks = [s.time for s in log.signals if len(s)]
     clocks += [log.frames.time] if log.frames is not None and len(log.frames) else []
@@ -158,9 +159,9 @@ def _told(log: Log, kept: str) -> Problem:
     return Problem.of("file.ends_short", file=log.path.name, kept=kept, length=span)
 
 
-def _open(opener: Any, path: Path, saved: Mended | None, folder: str) -> tuple[Any, int]:
+def _open(opener: Any, path: Path, saved: Repaired | None, folder: str) -> tuple[Any, int]:
     """Open the file and count its records; what the library raises becomes one sentence."""
-    # The library tells of damage with a traceback of its own, beside raising or not.
+    # The library reports damage with a traceback of its own, beside raising or not.
     logging.getLogger("asammdf").setLevel(logging.CRITICAL)
     hook = sys.unraisablehook
     # A half-opened file complains on standard error once more when it is collected.

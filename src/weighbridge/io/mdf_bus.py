@@ -11,7 +11,7 @@ from weighbridge.io.frames import EXTENDED_MASK, Frames, in_order
 
 _DATA_FRAME: Final = "CAN_DataFrame"
 _NUMBERS: Final = frozenset({"ID", "IDE", "DataLength", "DLC", "BusChannel"})
-# Bytes that a data length code stands for (ISO 11898-1).
+# Bytes that a data length code means (ISO 11898-1).
 _DLC: Final = np.array([0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64], np.uint8)
 
 

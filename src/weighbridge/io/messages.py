@@ -60,7 +60,7 @@ _DEEPEST: Final = 8
 # A header's stamp that is further from the recorder's clock is none [s].
 _NEAR: Final = 5.0
 
-# Records of MCAP: 8 bytes of magic, then kind and length of each; a chunk tells its unpacked
+# Records of MCAP: 8 bytes of magic, then kind and length of each; a chunk shows its unpacked
 # size after two times (the format's specification).
 _MAGIC: Final = 8
 _RECORD: Final = 9
@@ -229,7 +229,7 @@ def _recording(
     messages: Iterator[_Message],
     what: str,
 ) -> Recording:
-    """Collect the messages of all topics; each tells how its topic is read, asked once."""
+    """Collect the messages of all topics; each shows how its topic is read, asked once."""
     topics: dict[int, _Topic | None] = {}
     found = Recording([])
     damaged = 0
@@ -289,7 +289,7 @@ def _channels(topics: list[_Topic], found: Recording) -> None:
         if "status.status" in topic.fields and topic.kind == FIX:
             valid = rows[:, topic.fields.index("status.status")] >= 0.0
         for k, name in enumerate(topic.fields):
-            # What else a sensor tells, such as its orientation, is no quantity of a drive.
+            # What else a sensor shows, such as its orientation, is no quantity of a drive.
             if topic.kind in _KNOWN and name not in known:
                 continue
             values = np.where(valid, rows[:, k], np.nan)
@@ -400,7 +400,7 @@ def _absent(message: Any) -> frozenset[str]:
 
 
 def _json_topic(name: str, kind: str) -> _Topic:
-    """Topic of JSON messages, whose first one tells the fields."""
+    """Topic of JSON messages, whose first one shows the fields."""
     topic = _Topic(name, kind, json.loads, _json_fields, lambda _: (), _json_stamp)
 
     def numbers(message: Any) -> Sequence[float]:

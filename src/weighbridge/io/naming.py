@@ -1,4 +1,4 @@
-"""What a foreign log's column is, told from its name.
+"""What a foreign log's column is, distinguished from its name.
 
 A name is taken apart into words, in any spelling (``EngineSpeed``, ``engine_speed``, ``Engine
 speed [rpm]``), and held against what loggers call each quantity in several languages.
@@ -41,7 +41,7 @@ _ASPECTS: Final = {
         frozenset(("at", "clutch", "crank", "crankshaft", "flywheel", "net")),
     ),
 }  # fmt: skip
-"""Words that tell how a quantity is measured, or where: with one of them, several or none it is the
+"""Words that show how a quantity is measured, or where: with one of them, several or none it is the
 same."""
 
 _BARE: Final = frozenset(
@@ -58,8 +58,8 @@ _ACCEL_WORDS: Final = ("acc", "accel", "acceleration", "a", "g", "g force", "gfo
 def _phrases(quantity: str) -> tuple[str, ...]:
     """What loggers call a quantity in any language; its own name where nobody has one for it."""
     found = list(PHRASES.get(quantity, (quantity.replace("_", " "),)))
-    for told in LANGUAGES.values():
-        found += told.get(quantity, ())
+    for reported in LANGUAGES.values():
+        found += reported.get(quantity, ())
     if quantity == "longitudinal_accel":
         found += [f"{way} {kind}" for way in _ALONG for kind in _ACCEL_WORDS]
     return tuple(found)
@@ -87,7 +87,7 @@ _TIMES: Final = TIME_PHRASES | frozenset(TIMES)
 _SILENT: Final = _NOISE | SOURCES
 
 _SHORTEST: Final = 3
-"""Letters of a word at least that stands in another one."""
+"""Letters of a word at least that is in another one."""
 
 _LONGEST: Final = 40
 """Letters of a word at most that is put together of others."""
@@ -137,7 +137,7 @@ LEAST: Final = 0.66
 """Part of the words of a name that have to be those of a quantity [-]."""
 
 _MARKS: Final = frozenset(("txt", "wgs84", "gear", "bool", "int", "float", "on/off", "0/1", "none"))
-"""What stands in brackets as a unit does, and is none."""
+"""What is in brackets as a unit does, and is none."""
 
 _UNIT: Final = re.compile(r"[\[({<]\s*([^\])}>]{0,20}?)\s*[\])}>]")
 _PIPED: Final = re.compile(r'"?(?P<name>[^"|]+)"?\|"(?P<unit>[^"|]*)"(?:\|[^|]*)*$')
@@ -221,11 +221,11 @@ def _piped(name: str) -> str:
 
 
 def _kept(bracketed: str) -> str:
-    """What stands in brackets, where it is a word and no unit."""
+    """What is in brackets, where it is a word and no unit."""
     word = bracketed.strip()
     plain = len(_WORD.findall(word.lower())) and word.lower() not in _MARKS
-    told = word.lower() == "gps" or unit_suffix(word) is None
-    return f" {word} " if plain and len(word) > 2 and told else " "
+    reported = word.lower() == "gps" or unit_suffix(word) is None
+    return f" {word} " if plain and len(word) > 2 and reported else " "
 
 
 def unit_of(name: str) -> tuple[str | None, tuple[str, ...]]:
@@ -257,7 +257,7 @@ def recognise(name: str, unit: str | None = None) -> Named:
 
     Parameters
     ----------
-    name : as it stands in the log
+    name : as it is in the log
     unit : suffix of its unit, where the log states it elsewhere
 
     Returns
@@ -361,7 +361,7 @@ def recognise_all(
     ----------
     names : of the columns
     units : suffixes of their units, where the log states them elsewhere
-    misfits : whether it is to be told of a name why its unit keeps it from being a quantity
+    misfits : whether it is to be reported of a name why its unit keeps it from being a quantity
 
     Returns
     -------

@@ -51,12 +51,12 @@ _FIELDS: Final = {"RMC": 9, "GGA": 9, "GNS": 9, "GST": 7, "VTG": 7}
 
 
 def is_nmea(head: bytes) -> bool:
-    """Tell whether a text has lines of sentences, with or without something before them."""
+    """Return whether a text has lines of sentences, with or without something before them."""
     return len(_WHOLE.findall(head)) >= 2
 
 
 class UnfitSentenceError(Exception):
-    """A sentence that tells nothing; its text is why, as in ``3 sentences damaged``."""
+    """A sentence that shows nothing; its text is why, as in ``3 sentences damaged``."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -286,12 +286,12 @@ def _time(clock: Floats, day: Floats) -> tuple[Floats, bool]:
     values, counts = np.unique(starts, return_counts=True)
     if counts.max() > 0.5 * starts.size:
         return running + float(values[np.argmax(counts)]), True
-    # Recordings of several days in one file: each sentence takes the date last told.
+    # Recordings of several days in one file: each sentence takes the date last reported.
     last = np.maximum.accumulate(np.where(dated, np.arange(day.size), 0))
     last[: int(np.argmax(dated))] = int(np.argmax(dated))
-    told = day[last] + clock[last]
+    reported = day[last] + clock[last]
     time = day[last] + clock
-    return time + _DAY * np.round((told - time) / _DAY), True
+    return time + _DAY * np.round((reported - time) / _DAY), True
 
 
 def _nothing(path: Path, data: bytes, lost: Counter[str]) -> str:

@@ -359,7 +359,7 @@ def _in_silence(signal: Signal, time: Floats) -> Bools:
 
 
 def _differ(signal: Signal, time: Floats, values: Floats, limit: float) -> bool:
-    """Tell whether another source of a signal says something else at the same time."""
+    """Return whether another source of a signal says something else at the same time."""
     gap = np.abs(signal.at(time) - values)
     gap = gap[np.isfinite(gap) & (signal.age(time) < 2.0)]
     return gap.size >= 10 and float(np.median(gap)) > limit
@@ -447,8 +447,8 @@ def _choose(senders: list[_Sender], name: str, found: Obd, start: float) -> None
                 joined = np.concatenate([signal.values, values[alone]])[order]
                 signal = clean_signal(quantity, both[order], joined, name)[0] or signal
             else:
-                told = f"{quantity} ({time.size} for {len(signal)})"
-                left_out.setdefault(pair, []).append(told)
+                reported = f"{quantity} ({time.size} for {len(signal)})"
+                left_out.setdefault(pair, []).append(reported)
         found.signals.append(signal)
     for (other_name, best_name), spans in filled.items():
         first, last = min(s[1] for s in spans), max(s[2] for s in spans)

@@ -247,7 +247,7 @@ def _recording(held: _Held) -> Recording:
     def put(rows: _Rows, names: Iterable[tuple[str, str, str]], needed: frozenset[str]) -> None:
         time, cells = rows.arrays()
         for k, (name, quantity, unit) in enumerate(names):
-            # What a car does not tell is 0 in the log.
+            # What a car does not show is 0 in the log.
             if time.size and (name in needed or np.any(cells[:, k] != 0.0)):
                 values = np.ascontiguousarray(cells[:, k])
                 found.channels.append(Channel(name, time, values, unit, quantity))

@@ -57,7 +57,7 @@ def read_parquet(path: Path) -> RawTable:
 
 
 def _is_text(path: Path) -> bool:
-    """Tell whether a path can be written in UTF-8."""
+    """Return whether a path can be written in UTF-8."""
     try:
         str(path.absolute()).encode()
     except UnicodeEncodeError:

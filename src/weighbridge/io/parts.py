@@ -77,10 +77,10 @@ def read_parts(folder: Path, table: str) -> Log:
             with quietly():
                 frames.append(_read(path))
         except (*PARSE_ERRORS, OSError) as error:
-            told = Problem.of(
+            reported = Problem.of(
                 "file.part_damaged", file=folder.name, part=path.name, error=first_line(error)
             )
-            problems.append(told)
+            problems.append(reported)
     if not frames:
         raise DriveError(f"{folder}: no part of the table is readable; remove the folder")
     frame = in_order(frames)

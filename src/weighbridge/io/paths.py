@@ -12,7 +12,7 @@ from weighbridge.errors import ArgumentTypeError, DriveError
 
 
 def is_folder(path: Path) -> bool:
-    """Tell whether a path is a folder.
+    """Return whether a path is a folder.
 
     Raises
     ------
@@ -30,7 +30,7 @@ def is_folder(path: Path) -> bool:
 
 
 def given_paths(name: str, given: Iterable[str | Path]) -> list[str | Path]:
-    """Several paths, each checked; data frames, which hold names of columns, are told apart."""
+    """Several paths, each checked; data frames, which hold names of columns, are distinguished."""
     expected = "a path, as text or pathlib.Path, or a list of them"
     if is_frame(given) or isinstance(given, Mapping):
         raise ArgumentTypeError(

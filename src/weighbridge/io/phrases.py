@@ -1,4 +1,4 @@
-"""What loggers call each quantity, in seven languages, and the words that tell of another."""
+"""What loggers call each quantity, in seven languages, and the words that report another."""
 
 from __future__ import annotations
 

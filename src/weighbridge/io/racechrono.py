@@ -40,7 +40,7 @@ _KNOWN: Final = {
 
 
 def is_racechrono(head: bytes) -> bool:
-    """Tell whether a file begins as RaceChrono's exports do."""
+    """Return whether a file begins as RaceChrono's exports do."""
     return head.removeprefix(b"\xef\xbb\xbf").startswith(_BANNER)
 
 

@@ -102,7 +102,7 @@ def read_drives(
 ) -> list[Drive]:
     """Read the drives of a recording, such as a file of a whole day or several joined drives.
 
-    A drive ends where nothing is recorded for 5 minutes, where the vehicle stands for 10, where
+    A drive ends where nothing is recorded for 5 minutes, where the vehicle means 10, where
     speed, position or coolant jump as no vehicle's do, and where a table's clock begins anew.
 
     Parameters
@@ -242,7 +242,7 @@ def _read_known(
     mappings: tuple[TableMapping, ...],
     there: Sequence[Path],
 ) -> list[Log]:
-    """Read the files of a folder that can be read, and tell of others there that look like logs."""
+    """Read the files of a folder that can be read, and report others there that look like logs."""
     try:
         logs = _read_files(known, mappings)
     except UnnamedError as error:
@@ -315,7 +315,7 @@ def _read_file(
     read = form.read
     if form.takes is Takes.PLAIN and names:
         read = tabular.read_csv
-    # A mapping that names nothing may still tell how a text table is written.
+    # A mapping that names nothing may still show how a text table is written.
     taken = mapping if names or form.takes is Takes.TEXT else None
     try:
         log = read(path, table, taken)
@@ -398,7 +398,7 @@ def joined_drive(
 
 
 def _share_clock(logs: Sequence[Log]) -> None:
-    """Let clocks count from 1970 where all files tell when theirs began.
+    """Let clocks count from 1970 where all files show when theirs began.
 
     A file of measurement channels alone keeps its own clock, as its makers know it.
     """

@@ -112,7 +112,7 @@ def _mapping_of(raw: RawTable, mappings: tuple[TableMapping, ...]) -> TableMappi
 def _part_of(mapping: TableMapping, raw: RawTable, alike: list[RawTable]) -> TableMapping:
     """What of a mapping is for one of the tables that it is for.
 
-    That is what the table has; for the first also what none has, to be told once.
+    That is what the table has; for the first also what none has, to be reported once.
     """
     first = next(r for r in alike if any(_has(r, s) for s in mapping.signals))
     taken = (
@@ -124,7 +124,7 @@ def _part_of(mapping: TableMapping, raw: RawTable, alike: list[RawTable]) -> Tab
 
 
 def _is_long(raw: RawTable, mapping: TableMapping | None) -> bool:
-    """Tell whether a table has a row for each value, and no mapping names its columns."""
+    """Return whether a table has a row for each value, and no mapping names its columns."""
     named = mapping is not None and any(_has(raw, signal) for signal in mapping.signals)
     return not named and are_long(list(raw.names))
 
@@ -134,7 +134,7 @@ def _has(raw: RawTable, signal: MappedSignal) -> bool:
 
 
 def _is_canonical(raw: RawTable, table: str | None) -> bool:
-    """Tell whether a table has a time and a column of canonical names."""
+    """Return whether a table has a time and a column of canonical names."""
     if not any(time_unit(name) for name in raw.names):
         return False
     for name in raw.names:

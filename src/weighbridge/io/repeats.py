@@ -40,7 +40,7 @@ def settle_repeats(logs: Sequence[Log]) -> list[Problem]:
     """Keep one of two records of a sensor that two devices made of one drive at the same time.
 
     Whether it is one drive is seen from speed or position, which both have and which agree. What
-    the vehicle itself tells is not chosen from: two logs of it may be those of two drives.
+    the vehicle itself shows is not chosen from: two logs of it may be those of two drives.
 
     Parameters
     ----------
@@ -112,7 +112,7 @@ def _better(a: Log, b: Log, table: str) -> bool:
 
 
 def _one_drive(a: Log, b: Log) -> bool:
-    """Whether two files tell the same motion."""
+    """Whether two files show the same motion."""
     first, second = ({s.name: s for s in log.signals} for log in (a, b))
     if all(name in signals for name in _POSITION for signals in (first, second)):
         return _one_place(first, second)

@@ -4,7 +4,7 @@ Names, units and signs are those of the app's own reference pages (UNITS.md and
 COORDINATES.md of tszheichoi/awesome-sensor-logger): ``time`` in nanoseconds
 since 1970, m/s², rad/s, negative speed, bearing and accuracy meaning invalid.
 Acceleration with gravity is ``TotalAcceleration.csv``, of Android alone; on
-iOS the sign of acceleration hangs on a setting, so it is left out.
+iOS the sign of acceleration depends on a setting, so it is left out.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ _METADATA: Final = b"version,device name,"
 
 
 def is_sensor_logger(head: bytes) -> bool:
-    """Tell whether a file begins as Sensor Logger's do."""
+    """Return whether a file begins as Sensor Logger's do."""
     plain = head.removeprefix(b"\xef\xbb\xbf").replace(b'"', b"")
     return plain.startswith((b"time,seconds_elapsed,", _METADATA))
 

@@ -77,7 +77,7 @@ class _Chosen:
         self._sender: dict[str, tuple[int, float]] = {}
 
     def takes(self, name: str, sender: int, time: float) -> bool:
-        """Tell whether what a sender says at a time counts."""
+        """Return whether what a sender says at a time counts."""
         chosen, last = self._sender.get(name, (sender, time))
         first = self._lowest and sender < chosen
         if chosen != sender and time - last <= _SILENT and not first:
@@ -233,7 +233,7 @@ class J1939Stream:
         self._begun = np.inf
         self._switches: dict[tuple[str, int], tuple[float, bool]] = {}
         self._counts: dict[tuple[str, int], int] = {}
-        self._told: dict[str, bool] = {}
+        self._reported: dict[str, bool] = {}
 
     def filters(self) -> list[Filter]:
         """Frames that are wanted: the known parameter groups, of any sender."""
@@ -284,7 +284,7 @@ class J1939Stream:
         return (part.time[kept], values[kept]) if kept.any() else None
 
     def _torque(self, parts: dict[int, Frames]) -> Values:
-        """Net torque fraction; the indicated one under both names where no friction is told."""
+        """Net torque fraction; the indicated one under both names where no friction is reported."""
         if (friction := self._read(parts, SPN["friction_torque"])) is not None:
             self._friction = (float(friction[0][-1]), float(friction[1][-1]))
         if (parasitic := self._read(parts, SPN["parasitic_torque"])) is not None:
@@ -295,16 +295,18 @@ class J1939Stream:
             return {}
         time, torque = actual
         self._begun = min(self._begun, float(time[0]))
-        told, friction_torque = self._friction
-        if np.isfinite(told):
-            near = np.abs(time - told) <= FRICTION_AGE
+        reported, friction_torque = self._friction
+        if np.isfinite(reported):
+            near = np.abs(time - reported) <= FRICTION_AGE
             net = (torque - friction_torque - self._parasitic)[near]
             return {"engine_torque_fraction": (time[near], net)} if near.any() else {}
         late = time - self._begun > FRICTION_AGE
         if not late.any():
             return {}
-        told_alone = (time[late], torque[late])
-        return dict.fromkeys(("engine_torque_fraction", "indicated_torque_fraction"), told_alone)
+        reported_alone = (time[late], torque[late])
+        return dict.fromkeys(
+            ("engine_torque_fraction", "indicated_torque_fraction"), reported_alone
+        )
 
     def _switch(
         self, parts: dict[int, Frames], switch: str, spns: Sequence[str]
@@ -317,10 +319,10 @@ class J1939Stream:
                 continue
             values = spn_values(part, SPN[spn])
             there = np.isfinite(values)
-            told = is_pressed(spn, values[there])
+            reported = is_pressed(spn, values[there])
             senders = (part.id[there] & 0xFF).tolist()
             keys = [(spn, sender) for sender in senders]
-            events += zip(part.time[there].tolist(), keys, told.tolist(), strict=True)
+            events += zip(part.time[there].tolist(), keys, reported.tolist(), strict=True)
         if not events:
             return None
         rows: list[tuple[float, float]] = []
@@ -335,7 +337,7 @@ class J1939Stream:
             # Senders that speak one shortly after another say nothing new: the one that says most
             # gives the clock, others where they differ.
             most = max((k for k in self._counts if k[0] in spns), key=self._counts.__getitem__)
-            if key == most or self._told.get(switch) != on:
+            if key == most or self._reported.get(switch) != on:
                 rows.append((time, float(on)))
-            self._told[switch] = on
+            self._reported[switch] = on
         return (np.array([t for t, _ in rows]), np.array([v for _, v in rows])) if rows else None

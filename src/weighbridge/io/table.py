@@ -87,7 +87,7 @@ class TextFormat:
 
 @dataclass(frozen=True, slots=True)
 class RawTable:
-    """A table as it stands in the file.
+    """A table as it is in the file.
 
     Attributes
     ----------
@@ -125,7 +125,7 @@ class RawTable:
         return places[0] if len(places) == 1 else None
 
     def column(self, index: int) -> pl.Series:
-        """One column as it stands in the file."""
+        """One column as it is in the file."""
         if index in self.plain:
             return pl.Series(str(index), self.plain[index][0])
         return self.frame[str(index)]
@@ -161,8 +161,8 @@ class RawTable:
             empty = text.is_null() | text.str.to_lowercase().is_in(sorted(self.missing))
             wrong = numbers.is_null() & ~empty
             if int(wrong.sum()) > _TEXT_PART * int((~empty).sum()):
-                told = _one_unit(text)
-                numbers = told[0] if told is not None else numbers
+                reported = _one_unit(text)
+                numbers = reported[0] if reported is not None else numbers
                 wrong = numbers.is_null() & ~empty
             if bad := int(wrong.sum()):
                 example = text.filter(wrong)[0]
@@ -204,11 +204,11 @@ class RawTable:
         return np.asarray(values, dtype=np.float64), notes
 
     def cell_unit(self, index: int) -> str:
-        """Unit that stands in the cells of a column, behind their numbers; empty for none."""
+        """Unit that is in the cells of a column, behind their numbers; empty for none."""
         if index in self.plain or self.column(index).dtype != pl.String:
             return ""
-        told = _one_unit(self.column(index).head(_LOOKED_AT))
-        return told[1] if told is not None else ""
+        reported = _one_unit(self.column(index).head(_LOOKED_AT))
+        return reported[1] if reported is not None else ""
 
 
 def numbers_with_units(cells: pl.Series) -> tuple[pl.Series, pl.Series] | None:
@@ -236,14 +236,14 @@ def numbers_with_units(cells: pl.Series) -> tuple[pl.Series, pl.Series] | None:
 
 def _one_unit(cells: pl.Series) -> tuple[pl.Series, str] | None:
     """Numbers of the cells of a column and the unit behind them; None where it has none or more."""
-    told = numbers_with_units(cells)
-    if told is None:
+    reported = numbers_with_units(cells)
+    if reported is None:
         return None
-    units = told[1].drop_nulls().value_counts(sort=True)
+    units = reported[1].drop_nulls().value_counts(sort=True)
     if units.height > 1 and units["count"][1] > _FEW * cells.len():
         return None
-    unit = str(units[told[1].name][0])
-    return pl.DataFrame({"n": told[0], "u": told[1]}).select(
+    unit = str(units[reported[1].name][0])
+    return pl.DataFrame({"n": reported[0], "u": reported[1]}).select(
         pl.when(pl.col("u") == unit).then(pl.col("n"))
     ).to_series(), unit
 

@@ -173,7 +173,7 @@ def read_mapped(raw: RawTable, mapping: TableMapping) -> Log:
 
 
 def _mapped_time(raw: RawTable, mapping: TableMapping, log: Log) -> tuple[Floats, list[Problem]]:
-    """Read the time that a mapping names [s], and what was odd; tell the log of its kind.
+    """Read the time that a mapping names [s], and what was odd; show the log of its kind.
 
     Raises
     ------
@@ -214,7 +214,7 @@ def _finish(log: Log, raw: RawTable, time: Floats, columns: list[tuple[str, Floa
     if raw.rows == 0:
         log.problems.append(Problem.of("file.no_rows", file=raw.path.name))
         return
-    told = list(log.problems)
+    reported = list(log.problems)
     signals, problems = clean_columns(time, columns, raw.path.name)
     log.signals += signals
     log.problems += problems
@@ -222,7 +222,7 @@ def _finish(log: Log, raw: RawTable, time: Floats, columns: list[tuple[str, Floa
         signals, problems = clean_columns(
             time[rows], [(name, values[rows]) for name, values in columns], raw.path.name
         )
-        piece = Log(raw.path, signals, [*told, *problems], list(log.lacking), log.absolute)
+        piece = Log(raw.path, signals, [*reported, *problems], list(log.lacking), log.absolute)
         piece.units = log.units
         log.pieces.append(piece)
 
@@ -260,13 +260,13 @@ def _named_hint(raw: RawTable) -> str:
 
 
 def _of_numbers(names: Sequence[str]) -> bool:
-    """Whether what stands for names is a row of numbers and times, whatever parts them."""
+    """Whether what means names is a row of numbers and times, whatever parts them."""
     cells = [cell for name in names for cell in _PARTED.split(name) if cell.strip()]
     return bool(cells) and sum(_NUMBER.match(cell) is not None for cell in cells) > 0.5 * len(cells)
 
 
 def _other_separator(raw: RawTable) -> str:
-    """Separator that stands in the names of a table, where it is not the one given."""
+    """Separator that is in the names of a table, where it is not the one given."""
     others = (s for s in SEPARATORS if raw.separator and s != raw.separator)
     return next((s for s in others if any(s in name for name in raw.names)), "")
 
@@ -286,7 +286,7 @@ def _near(column: str, raw: RawTable) -> str:
 
 
 def _column_named(name: str) -> str:
-    """Canonical column that a logger's name stands for; empty where its name tells none surely."""
+    """Canonical column that a logger's name means; empty where its name shows none surely."""
     found = recognise(name)
     if not found.quantity or found.score < 1.0:
         return ""

@@ -75,13 +75,13 @@ def _leaf(
     Waveforms of one start and step share their clock.
     """
     values = np.asarray(channel[:])
-    told = channel.properties
-    unit = str(told.get("unit_string", ""))
-    step = told.get("wf_increment")
+    reported = channel.properties
+    unit = str(reported.get("unit_string", ""))
+    step = reported.get("wf_increment")
     if time.column is not None or not isinstance(step, float) or step <= 0.0:
         return Leaf(values, unit), False
-    start = told.get("wf_start_time")
-    begin = float(told.get("wf_start_offset", 0.0))
+    start = reported.get("wf_start_time")
+    begin = float(reported.get("wf_start_offset", 0.0))
     dated = isinstance(start, np.datetime64) and not np.isnat(start)
     if dated:
         begin += float(np.datetime64(start, "us").astype(np.int64)) * 1e-6

@@ -34,7 +34,7 @@ _KNOWN: Final = {
 
 
 def is_track_mode(head: bytes) -> bool:
-    """Tell whether a CSV begins as Tesla's Track Mode writes it."""
+    """Return whether a CSV begins as Tesla's Track Mode writes it."""
     begin = f"{_LAP},{_TIME},Speed (".encode()
     return head.removeprefix(b"\xef\xbb\xbf").startswith(begin)
 

@@ -34,7 +34,7 @@ _OTHERS: Final = frozenset(("Vin", "CreatedAt", "IsResend"))
 
 
 def is_fleet_telemetry(head: bytes) -> bool:
-    """Tell whether a text holds records of Fleet Telemetry."""
+    """Return whether a text holds records of Fleet Telemetry."""
     return bool(_BEGIN.match(head) or _LOGGED.match(head))
 
 
@@ -138,7 +138,7 @@ def _payload(record: Any) -> tuple[str, str, list[tuple[str, float]]] | None:
 
 def _numbers(name: str, value: Any) -> Iterator[tuple[str, float]]:
     if isinstance(value, dict) and not set(_PLACE) <= value.keys():
-        # With types told, the logger wraps each value.
+        # With types reported, the logger wraps each value.
         for below in value.values():
             yield from _numbers(name, below) if not isinstance(below, dict) else ()
     elif isinstance(value, dict):

@@ -1,6 +1,6 @@
 """Torque Pro track logs: OBD-II values and the phone's position, about once a second.
 
-Names as the app writes them in English; each value's unit stands in the last
+Names as the app writes them in English; each value's unit is in the last
 brackets of its name. The time is the phone's, in its zone. Its acceleration
 (``G(x)`` …) is left out: signs and what ``G(calibrated)`` leaves out are not
 documented.
@@ -43,7 +43,7 @@ _WORDS: Final = {"meters/second": "mps"}
 
 
 def is_torque_pro(head: bytes) -> bool:
-    """Tell whether a file begins as Torque Pro's track logs do."""
+    """Return whether a file begins as Torque Pro's track logs do."""
     names = [c.strip().lower() for c in head.split(b"\n", 1)[0].split(b",")]
     return names[:2] == [b"gps time", b"device time"]
 

@@ -22,7 +22,7 @@ Ints = NDArray[np.intp]
 _FEW: Final = 0.01
 """Part of the rows that end early, at most: above it the logger leaves last cells out [-]."""
 
-# Lines with more cells than names of which it is looked at what stands in them.
+# Lines with more cells than names of which it is looked at what is in them.
 _LOOKED_AT: Final = 1000
 
 
@@ -221,9 +221,9 @@ def without_open_quotes(data: bytes) -> tuple[bytes, Ints]:
     opened = count % 2 == 1
     if not opened.any():
         return data, lines[:0]
-    mended = text.copy()
-    mended[quotes[opened[place]]] = ord(" ")
-    return mended.tobytes(), lines[opened]
+    corrected = text.copy()
+    corrected[quotes[opened[place]]] = ord(" ")
+    return corrected.tobytes(), lines[opened]
 
 
 def number_of(path: Path, text: str) -> int:

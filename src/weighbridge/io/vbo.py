@@ -196,7 +196,7 @@ def _mirrored(latitude: Floats, longitude: Floats, course: Floats) -> bool:
 def _mapped(
     log: Log, mapping: TableMapping | None, names: list[str], titles: list[str]
 ) -> list[tuple[MappedSignal, int]]:
-    """Columns that a mapping names, the speed apart of which it tells the unit alone."""
+    """Columns that a mapping names, the speed apart of which it shows the unit alone."""
     found = []
     by_title = [t.lower() for t in titles] if len(titles) == len(names) else []
     for signal in mapping.signals if mapping else ():
@@ -253,7 +253,7 @@ def _cells(log: Log, lines: list[str], width: int) -> Floats:
 
 
 def _dated(time: Floats, head: str) -> tuple[Floats, bool]:
-    """Count from 1970 where the file tells its date.
+    """Count from 1970 where the file shows its date.
 
     The date may be of another zone than the times, which are UTC: of the days
     around it the one that puts the first row nearest to it is taken.

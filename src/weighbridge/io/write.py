@@ -112,7 +112,7 @@ def write_mdf(
     """Write a drive as one MF4, one channel group per clock, compressed.
 
     Channels have canonical names with unit suffixes; what is known beside the
-    signals stands in the file's comment.
+    signals is in the file's comment.
 
     Parameters
     ----------
@@ -138,7 +138,7 @@ def write_mdf(
         clocks.setdefault(id(s.time), []).append(s)
     with warnings.catch_warnings(), whole_file(path, DriveError) as part:
         warnings.simplefilter("ignore")
-        # The library tells of a full disk with a traceback of its own, beside raising.
+        # The library reports a full disk with a traceback of its own, beside raising.
         logging.getLogger("asammdf").setLevel(logging.CRITICAL)
         with contextlib.redirect_stdout(io.StringIO()), MDF(version="4.10") as file:
             # The clock of a drive counts from its own zero.
@@ -284,7 +284,7 @@ def _write_frame(frame: pl.DataFrame, path: Path) -> None:
             else:
                 frame.write_csv(file)
     except pl.exceptions.PolarsError as e:
-        # A full disk, told behind words of the library's own.
+        # A full disk, reported behind words of the library's own.
         raise OSError(first_line(e).rpartition("IO error: ")[2]) from None
 
 

@@ -77,7 +77,7 @@ def needs(vehicle: Vehicle | None = None) -> tuple[Need, ...]:
 def needed_signals(vehicle: Vehicle, came: Iterable[str]) -> tuple[str, ...]:
     """Name the signals that a vehicle is weighed by on the way.
 
-    Of what can be told by several sets of signals it is the set that came, else the first. An
+    Of what can be shown by several sets of signals it is the set that came, else the first. An
     inertial sensor is needed once it has come; without one the mass is that of all records so
     far, each time they are looked at.
 
@@ -99,7 +99,7 @@ def needed_signals(vehicle: Vehicle, came: Iterable[str]) -> tuple[str, ...]:
 def health_of(
     records: Records, needed: tuple[str, ...], silence: float, *, parked: bool = False
 ) -> tuple[SignalHealth, ...]:
-    """Tell how each signal comes, those that are needed first.
+    """Return how each signal comes, those that are needed first.
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ def health_of(
 
 
 def is_parked(records: Records, needed: tuple[str, ...], silence: float) -> bool:
-    """Tell whether a vehicle is parked: it stands, and has stopped reporting.
+    """Return whether a vehicle is parked: it stands, and has stopped reporting.
 
     It stands by the newest speed of any sensor. It reports while any signal that a weighing needs
     of it comes at least each `SILENT`; one that is off is asked much more seldom, and answers.
@@ -213,7 +213,7 @@ class Arrivals:
         return (count - 1) / span if count > 1 and span > 0.0 else float("nan")
 
     def of(self, need: Need) -> Arrival:
-        """Tell how something that is needed arrives."""
+        """Return how something that is needed arrives."""
         lacking = [tuple(n for n in signals if n not in self._count) for signals in need.sets]
         best = min(range(len(lacking)), key=lambda k: len(lacking[k]) / len(need.sets[k]))
         rates = [self.rate(n) for n in need.sets[best] if n in self._count]

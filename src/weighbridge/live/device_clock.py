@@ -36,7 +36,7 @@ class DeviceClock:
     def __init__(self, period: float = math.inf) -> None:
         self.renewed = 0
         self._period = period
-        self._told = -math.inf
+        self._reported = -math.inf
         self._turns = 0
         self._best = math.inf
         self._before = math.inf
@@ -93,6 +93,6 @@ class DeviceClock:
         """Let a stamp go on where the device counts from 0 again [s]."""
         if math.isinf(self._period):
             return stamp
-        self._turns += stamp - self._told < -0.5 * self._period
-        self._told = stamp
+        self._turns += stamp - self._reported < -0.5 * self._period
+        self._reported = stamp
         return stamp + self._turns * self._period

@@ -22,7 +22,7 @@ LONGEST_PAUSE: Final = 30.0
 
 # Blocks of samples that wait at most: 50 s of ten sources at 10 blocks a second.
 _MOST_BLOCKS: Final = 5000
-# A source must end within a second of being told to.
+# A source must end within a second of being asked to.
 _CLOSING: Final = 1.5
 # How long a source that waits for room sleeps before it looks whether it shall stop [s].
 _GLANCE: Final = 0.1
@@ -203,7 +203,7 @@ class _Runner:
         self._lost = ""
         self._came = False
         self._error = "no sample yet"
-        self._told = False
+        self._reported = False
         self._since = now()
         self._restarts = 0
         self.thread = Thread(target=self._run, name=source.name, daemon=True)
@@ -227,12 +227,12 @@ class _Runner:
             if bool(error) != bool(self._error):
                 self._since = now()
             self._error = error
-            if trouble and not self._told:
+            if trouble and not self._reported:
                 _logger.warning("%s", trouble_text(self.source.name, trouble))
-                self._told = True
-            elif not error and self._told:
+                self._reported = True
+            elif not error and self._reported:
                 _logger.warning("%s is back", source_text(self.source.name))
-                self._told = False
+                self._reported = False
 
     def _run(self) -> None:
         shortest, longest = self._feed._pauses

@@ -80,12 +80,12 @@ class Keeper:
         if not -_AHEAD <= after <= OLDEST and math.isfinite(after):
             new.take_tare(scale)
             return new, f"{self.path}: {self._of_another_time(scale.newest, start)}"
-        told = scale.weighing()
-        if told.mass != told.mass:
+        reported = scale.weighing()
+        if reported.mass != reported.mass:
             return scale, ""
-        low, high = told.interval()
+        low, high = reported.interval()
         return scale, (
-            f"going on from {told.mass:.0f} ± {0.5 * (high - low):.0f} kg of the checkpoint: "
+            f"going on from {reported.mass:.0f} ± {0.5 * (high - low):.0f} kg of the checkpoint: "
             "press l where the load has changed since"
         )
 

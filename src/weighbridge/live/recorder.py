@@ -46,7 +46,7 @@ class Recorder:
     """Writes samples as a canonical drive: a part a half minute, one table each at the end.
 
     `weighbridge.read_drive` reads the folder at any time, also after the process was killed. A
-    disk that is full or gone ends the recording, raises nothing, and is told by `problem`.
+    disk that is full or gone ends the recording, raises nothing, and is shown by `problem`.
 
     Parameters
     ----------

@@ -79,8 +79,8 @@ class Recordings:
     @property
     def problem(self) -> str:
         """Why the recording has ended, one sentence; empty while it goes on."""
-        told = [r.problem for r, _ in self._closing] + [self._recorder.problem]
-        return next(filter(None, told), "")
+        reported = [r.problem for r, _ in self._closing] + [self._recorder.problem]
+        return next(filter(None, reported), "")
 
     def put(self, samples: Samples) -> None:
         """Take a block of samples."""

@@ -16,11 +16,11 @@ from weighbridge.estimators.judging import STOP
 from weighbridge.live.arrival import health_of, is_parked, needed_signals
 from weighbridge.live.checkpoint import packed, refuse_absurd, unpacked
 from weighbridge.live.clock import pace
-from weighbridge.live.doubts import doubts, of_before
 from weighbridge.live.learning import LONGEST, Learned, known_mass
 from weighbridge.live.looking import Look, Step
 from weighbridge.live.on_the_move import FIRST, OnTheMove, moves
 from weighbridge.live.outlook import Outlook, outlook
+from weighbridge.live.questions import doubts, of_before
 from weighbridge.live.records import LATENESS, Records
 from weighbridge.live.source import Samples
 from weighbridge.live.weighing import LiveStatus, LiveWeighing, SignalHealth
@@ -376,8 +376,10 @@ class LiveScale:
     def _goes_on(self) -> bool:
         """Whether the mass is that of the forward stages, which each second of driving makes."""
         state = self._state
-        told = self._learned is None or not self._learned.inconsistent
-        return told and self._setup is not None and state is not None and state.joint.windows > 0
+        reported = self._learned is None or not self._learned.inconsistent
+        return (
+            reported and self._setup is not None and state is not None and state.joint.windows > 0
+        )
 
     def _look(self, state: ForwardState | None) -> float:
         """Part of the driving until the next look that is done [-]; NaN where nothing waits."""

@@ -121,13 +121,15 @@ class Session:
             for s in self.feed.states()
             if s.error and not s.ended
         ]
-        told = (*active, *lost, *self._doubts())
+        reported = (*active, *lost, *self._doubts())
         ahead = ahead and self.ahead and not settled.parked
         weighing = self.scale.weighing(silence, ahead=True) if ahead else settled
-        self.outputs.show(replace(weighing, alerts=states, problems=(*told, *weighing.problems)))
+        self.outputs.show(
+            replace(weighing, alerts=states, problems=(*reported, *weighing.problems))
+        )
 
     def _renew(self) -> None:
-        """Tell the scale of a device that was turned on again."""
+        """Inform the scale of a device that was turned on again."""
         if self.feed.renewed > self._renewed:
             self._renewed = self.feed.renewed
             self.scale.renew()

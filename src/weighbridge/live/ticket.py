@@ -24,11 +24,11 @@ class Ticketed(NamedTuple):
     Attributes
     ----------
     vehicle : calibrated by the drive; None where the one before is the better one
-    told : one sentence
+    reported : one sentence
     """
 
     vehicle: Vehicle | None
-    told: str
+    reported: str
 
 
 def calibrated_by_ticket(drive: Drive, ticket: float, before: Vehicle) -> Ticketed:

@@ -11,7 +11,7 @@ from weighbridge.kernels.lowpass import lowpass_resample
 from weighbridge.messages import refused
 from weighbridge.navigation.axes import Axes
 from weighbridge.navigation.dropouts import false_rows, repeated_rows
-from weighbridge.navigation.frozen import thawed
+from weighbridge.navigation.frozen import without_frozen
 from weighbridge.navigation.geodesy import LocalFrame
 from weighbridge.signals import Bools, Drive, Floats, Signal
 from weighbridge.signals.catalogue import IMU_SIGNALS
@@ -84,7 +84,7 @@ def read_imu(drive: Drive) -> Imu:
     missing = drive.missing(IMU_SIGNALS)
     if missing:
         raise refused("imu.missing", drive=drive.name, missing=", ".join(missing))
-    drive = thawed(drive, IMU_SIGNALS)
+    drive = without_frozen(drive, IMU_SIGNALS)
     signals = [drive.signals[n] for n in IMU_SIGNALS]
     start = max(float(s.time[0]) if len(s) else np.inf for s in signals)
     end = min(float(s.time[-1]) if len(s) else -np.inf for s in signals)

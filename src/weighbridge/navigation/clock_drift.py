@@ -18,7 +18,7 @@ from weighbridge.navigation.clock_lag import (
     find_offset,
     locate_step,
 )
-from weighbridge.navigation.frozen import thawed
+from weighbridge.navigation.frozen import without_frozen
 from weighbridge.signals import QUANTITIES, Bools, Drive, Floats, Problem, Signal
 from weighbridge.signals.instants import instant, span
 from weighbridge.signals.robust import huber, spread
@@ -96,7 +96,7 @@ class _Path:
         return np.asarray(inner + self.slope * (before + after))
 
 
-def mend_clocks(drive: Drive) -> Drive:
+def correct_clocks(drive: Drive) -> Drive:
     """Bring tables back onto the clock of the inertial sensor where they leave it.
 
     The lag of vehicle speed and of speed over ground against the accelerometer is found in
@@ -114,21 +114,21 @@ def mend_clocks(drive: Drive) -> Drive:
     Drive
         What was moved is in its ``problems``; serious where the clocks cannot be brought together.
     """
-    mended = _round(drive)
+    corrected = _round(drive)
     for _ in range(_ROUNDS - 1):
-        if mended is drive or any(p.serious for p in mended.problems[len(drive.problems) :]):
-            return mended
-        drive, mended = mended, _round(mended)
-    if all(mended.get(name) is drive.get(name) for name in ("vehicle_speed", "accel_x")):
-        return mended
-    return mended.with_problems(_hopeless("obd", phrase("clocks_tried")))
+        if corrected is drive or any(p.serious for p in corrected.problems[len(drive.problems) :]):
+            return corrected
+        drive, corrected = corrected, _round(corrected)
+    if all(corrected.get(name) is drive.get(name) for name in ("vehicle_speed", "accel_x")):
+        return corrected
+    return corrected.with_problems(_hopeless("obd", phrase("clocks_tried")))
 
 
 def _round(drive: Drive) -> Drive:
     """Move what is seen to be off; the drive itself where nothing is."""
     axes = [f"accel_{a}" for a in "xyz"]
-    thaw = thawed(drive, axes)
-    accel = [s for name in axes if (s := thaw.get(name)) is not None and len(s) > 50]
+    unfrozen = without_frozen(drive, axes)
+    accel = [s for name in axes if (s := unfrozen.get(name)) is not None and len(s) > 50]
     if len(accel) < 3:
         return drive
     force = Integrated.of(accel)
@@ -154,7 +154,7 @@ def _round(drive: Drive) -> Drive:
 
 
 def _narrowed(path: _Path, force: Integrated, speed: Signal) -> _Path:
-    """Cut out no more about each step than is in doubt, and keep both its sides to the edge."""
+    """Cut out no more about each step than is uncertain, and keep both its sides to the edge."""
     time, lag, cuts = path.time, path.lag, []
     for cut in path.cuts:
         sides = (float(lag[time <= cut[0]][-1]), float(lag[time >= cut[1]][0]))

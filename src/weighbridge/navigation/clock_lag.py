@@ -151,12 +151,12 @@ def find_lags(force: Integrated, speed: Signal, *, centre: float = 0.0) -> Lags:
             part = slice(first, first + size)
             if first not in found:
                 if np.mean(seen[part]) < _WHOLE:
-                    told = _explained_in_gaps(
+                    reported = _explained_in_gaps(
                         shown[part], seen[part], [c[there] for c in changes], felt[there]
                     )
                 else:
-                    told = _explained(x[part], axes[there], felt[there])
-                peak = _peak(*told, size)
+                    reported = _explained(x[part], axes[there], felt[there])
+                peak = _peak(*reported, size)
                 if peak is not None:
                     found[first] = peak
     at = sorted(found)

@@ -361,7 +361,7 @@ def _levelled_so_far(
 
 
 def _aided(found: Found | None, time: Floats) -> Bools:
-    """Tell the instants (n,) not long after a speed or fix."""
+    """Return the instants (n,) not long after a speed or fix."""
     near: Bools = np.zeros(time.size, dtype=bool)
     if found is None:
         return near

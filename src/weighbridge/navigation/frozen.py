@@ -81,15 +81,15 @@ def inside(stretches: Floats, time: Floats) -> Bools:
     return np.asarray((k >= 0) & (time <= stretches[np.maximum(k, 0), 1]))
 
 
-def thawed(drive: Drive, names: Iterable[str]) -> Drive:
+def without_frozen(drive: Drive, names: Iterable[str]) -> Drive:
     """Leave the frozen stretches out of the axes named; a drive without any is returned as is."""
     speed = drive.speed
-    mended = []
+    corrected = []
     for name in names:
         s = drive.get(name)
         if s is None or len(s) < 2:
             continue
         lost = inside(frozen_stretches(s, speed), s.time)
         if lost.any() and np.count_nonzero(~lost) >= _FEWEST:
-            mended.append(Signal(name, s.time[~lost], s.values[~lost]))
-    return drive.with_signals(*mended) if mended else drive
+            corrected.append(Signal(name, s.time[~lost], s.values[~lost]))
+    return drive.with_signals(*corrected) if corrected else drive

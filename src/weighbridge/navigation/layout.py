@@ -348,7 +348,7 @@ def _levelled(time: Floats, grade: Floats, pose: Pose, setup: Setup) -> tuple[Fl
 
 
 def _valid(found: Found, accel: Floats, setup: Setup) -> Bools:
-    """Tell the instants (n,) at which there were samples, and aid not long ago."""
+    """Return the instants (n,) at which there were samples, and aid not long ago."""
     grid, stamps, fixes = found.grid.time, found.block.time, found.fixes
     near = np.clip(np.searchsorted(stamps, grid), 1, stamps.size - 1)
     valid: Bools = (

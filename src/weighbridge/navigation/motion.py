@@ -110,7 +110,7 @@ class Motion:
     speed_std : of ``speed`` where ``accel`` is its slope, as a smoother knows it; 0 where an
         accelerometer gave ``accel`` [m/s]
     specific_force_scale_std : relative, of the accelerometer's scale where it was corrected [-]
-    doubted_gain : specific force along the vehicle per change of its speed, where it is not 1 and
+    uncertain_gain : specific force along the vehicle per change of its speed, where it is not 1 and
         was left as it is, for it may be the accelerometer's scale or an error of the squat [-]
     measured_speed : samples of the speed that all of this was made from, true scale; None where an
         accelerometer was there as well
@@ -143,7 +143,7 @@ class Motion:
     mounting_std: tuple[float, float, float] | None = None
     speed_std: float = 0.0
     specific_force_scale_std: float = 0.0
-    doubted_gain: float | None = None
+    uncertain_gain: float | None = None
     measured_speed: Signal | None = None
     notes: tuple[Problem, ...] = ()
     _rate: float | None = field(default=None, init=False, repr=False, compare=False)

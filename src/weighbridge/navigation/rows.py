@@ -110,7 +110,7 @@ def place_nodes(
 
 
 def rests(grid: Even, rot_bs: Floats, limits: tuple[float, float], *, causal: bool) -> Bools:
-    """Tell the instants (n,) of an even clock around which force and rate hardly change.
+    """Return the instants (n,) of an even clock around which force and rate hardly change.
 
     Parameters
     ----------
@@ -148,7 +148,7 @@ def still_state(
     node_time: Floats, grid: Even, rot_bs: Floats, wheel: Signal | None, reference: Signal,
     *, causal: bool = False,
 ) -> Floats:  # fmt: skip
-    """Tell standing from moving: 0 moving, 1 wheels stand, 2 the body rests too.
+    """Distinguish standing from moving: 0 moving, 1 wheels stand, 2 the body rests too.
 
     Parameters
     ----------

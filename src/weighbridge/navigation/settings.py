@@ -56,7 +56,7 @@ class NavigationSettings:
     squat_found_std : below this standard deviation the drive has shown its squat
     speed_scale_std : of indicated over true speed before the drive [-]
     gate : normalised innovation squared above which a row is refused [-]
-    patience : refusals in succession before the filter doubts itself [-]
+    patience : refusals in succession before the filter questions itself [-]
     smooth : go backward over the drive after going forward
     max_gap : inertial samples further apart leave a gap [s]
     """

@@ -12,7 +12,7 @@ from typing import Any, Final
 import numpy as np
 
 from weighbridge.arguments import check_path, check_text, check_type, suggestion
-from weighbridge.checks import mend_drive, refuse_serious
+from weighbridge.checks import correct_drive, refuse_serious
 from weighbridge.constants import GRAVITY
 from weighbridge.errors import ConfigError
 from weighbridge.estimators.settings import changed, differences
@@ -76,7 +76,7 @@ STATIC_PART: Final = 0.04
 """Weight at rest and mass in motion may differ by this part of the mass [-]."""
 
 HOPPING: Final = 0.0075
-"""A ride sampled more slowly is told that faster is better [s]: at 100 Hz the axles' hop is
+"""A ride sampled more slowly is reported that faster is better [s]: at 100 Hz the axles' hop is
 integrated to within 0.5 %, at 200 Hz to within 0.03 %."""
 
 TILT: Final = 0.003
@@ -168,10 +168,10 @@ def _estimate(
             Status.NOT_EXCITED,
             Problem.of("ride.still"),
         )
-    mended = mend_drive(only)
-    found = [*mended.problems, *check_signals(only)]
+    corrected = correct_drive(only)
+    found = [*corrected.problems, *check_signals(only)]
     refuse_serious(drive.name, found)
-    samples = ride_samples(mended)
+    samples = ride_samples(corrected)
     seen = response(samples, ride)
     found += check_response(seen) if seen is not None else ()
     refuse_serious(drive.name, found)
@@ -335,7 +335,7 @@ def _limits(
 
 
 def _tilt_notes(samples: RideSamples, ride: Ride) -> tuple[Problem, ...]:
-    """Tell where front and rear springs contradict each other about how the body leans."""
+    """Return where front and rear springs contradict each other about how the body leans."""
     front, rear, std = body_tilt(samples, ride)
     if abs(front - rear) > max(TILT, TILT_PART * max(abs(front), abs(rear)), 4.0 * std):
         return (Problem.of("ride.tilt", front=1000.0 * front, rear=1000.0 * rear),)

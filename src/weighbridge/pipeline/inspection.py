@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 
 from weighbridge.balance.speed_balance import SPEEDS
-from weighbridge.checks import mend_drive
+from weighbridge.checks import correct_drive
 from weighbridge.navigation.motion import MotionSource
 from weighbridge.pipeline.expected import (
     EXPECTED,
@@ -214,22 +214,22 @@ def inspect_drive(drive: GivenDrive, vehicle: GivenVehicle | None = None) -> Ins
     drive = as_drive(drive, mapping_of(vehicle, home))
     order = list(QUANTITIES)
     signals = sorted(drive.signals.values(), key=lambda s: order.index(s.name))
-    mended = mend_drive(drive, vehicle)
-    problems, along = mended.problems, mended.get("longitudinal_accel")
+    corrected = correct_drive(drive, vehicle)
+    problems, along = corrected.problems, corrected.get("longitudinal_accel")
     if not any(p.serious for p in problems):
-        problems += _by_battery(mended, vehicle)
+        problems += _by_battery(corrected, vehicle)
     return Inspection(
         drive=drive,
         signals=tuple(describe(s) for s in signals),
         problems=tuple(sorted(dict.fromkeys(problems), key=lambda p: not p.serious)),
         ways=_ways(
-            drive if along is None else drive.with_signals(along), vehicle, excitation(mended)
+            drive if along is None else drive.with_signals(along), vehicle, excitation(corrected)
         ),
     )
 
 
 def _by_battery(drive: Drive, vehicle: Vehicle | None) -> tuple[Problem, ...]:
-    """Tell what battery power says of the torque of an electric drive with one gear."""
+    """Return what battery power says of the torque of an electric drive with one gear."""
     if vehicle is None or not vehicle.driveline.single_speed:
         return ()
     found = find_power_balance(drive, vehicle)

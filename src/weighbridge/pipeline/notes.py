@@ -18,7 +18,7 @@ from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
 
 
 def uncalibrated(vehicle: Vehicle, result: MassTrack) -> tuple[Problem, ...]:
-    """Say what a file that no calibration made leaves open in the interval; nothing if one did."""
+    """Say what a file that no calibration made leaves uncertain; nothing if one did."""
     if vehicle.provenance.mass_scale_std is not None:
         return ()
     fit = vehicle.provenance.fit
@@ -33,8 +33,8 @@ def uncalibrated(vehicle: Vehicle, result: MassTrack) -> tuple[Problem, ...]:
 
 
 UNBACKED_STD: Final = 0.025
-"""What masses of a calibration that nothing backs leave open of a mass, relative [-]: chosen, as
-if three of a hundred were wrong by 15 %."""
+"""What masses of a calibration that nothing backs leave uncertain of a mass, relative [-]: chosen,
+as if three of a hundred were wrong by 15 %."""
 
 
 def unbacked(vehicle: Vehicle) -> tuple[Problem, ...]:
@@ -145,7 +145,7 @@ def below_tare(vehicle: Vehicle, result: MassTrack) -> tuple[Problem, ...]:
 
 
 LIGHTER: Final = 0.9
-"""Masses below so much of the lightest of the calibration are told, where no tare is stated [-]."""
+"""Masses below so much of the lightest of the calibration are noted without a tare [-]."""
 
 
 def lighter_than_known(vehicle: Vehicle, result: MassTrack) -> tuple[Problem, ...]:

@@ -25,7 +25,7 @@ from weighbridge.balance.gear_scale import scale_contradiction
 from weighbridge.balance.hybrid import motor_helps
 from weighbridge.balance.shaking import shaken
 from weighbridge.balance.speed_balance import speed_balance
-from weighbridge.balance.torque_drift import steadied
+from weighbridge.balance.torque_drift import smoothed_steps
 from weighbridge.errors import ConfigError, WeighbridgeError
 from weighbridge.estimators import ESTIMATORS, MassTrack, Status, joint
 from weighbridge.estimators.gate import GATE
@@ -85,8 +85,9 @@ ALTERED: Final = ("torque.steps_filtered",)
 """Findings that the torque's reading was altered after it was sent."""
 
 ALTERED_STD: Final = 0.05
-"""What that leaves open of a mass, relative [-]: five such readings (scaled from mid-drive on, or
-bent by a power of 1.2) were 3 to 6 % off, and the check found none of 300 undamaged drives."""
+"""What that leaves uncertain of a mass, relative [-]: five such readings (scaled from mid-drive
+on, or bent by a power of 1.2) were 3 to 6 % off, and the check found none of 300 undamaged
+drives."""
 
 ONE_TABLE: Final = 0.4
 """Lateness of speed and torque that differs by less is that of their table [s]: speeds are late by
@@ -172,10 +173,10 @@ def weigh(
         check_type("settings", settings, Mapping, "a dictionary of values by name")
     chosen = ESTIMATORS[method].settings_of(settings) if settings else None
 
-    from weighbridge.checks import mend_drive, refuse_serious
+    from weighbridge.checks import correct_drive, refuse_serious
 
     home, vehicle = home_of(vehicle), as_vehicle(vehicle)
-    drive = mend_drive(as_drive(drive, mapping_of(vehicle, home), mapping), vehicle)
+    drive = correct_drive(as_drive(drive, mapping_of(vehicle, home), mapping), vehicle)
     refuse_serious(drive.name, drive.problems)
     found = weigh_checked(drive, vehicle, method, chosen)
     kg = (found.mass, found.std)
@@ -413,7 +414,7 @@ def torque_balance(drive: Drive, vehicle: Vehicle) -> tuple[ForceBalance, tuple[
     found, navigation = identify_motion(drive, vehicle)
     motion = of_vehicle(found, vehicle)
     delay = vehicle.timing.torque_delay
-    drive, drifted, begun = steadied(drive, vehicle, motion, delay or 0.0)
+    drive, drifted, begun = smoothed_steps(drive, vehicle, motion, delay or 0.0)
     notes = motion.notes + drifted
     if delay is None:
         delay = estimate_torque_delay(drive, vehicle, motion, begun)

@@ -21,7 +21,7 @@ from weighbridge.report.text import (
     with_half,
 )
 from weighbridge.vehicle.data_sheet import by_data_sheet, scale_std
-from weighbridge.vehicle.telling import can_weigh
+from weighbridge.vehicle.description import can_weigh
 
 if TYPE_CHECKING:
     from weighbridge.results.weighing import MassResult
@@ -124,7 +124,9 @@ def answer_block(answer: Answer) -> str:
     low, high = answer.interval
     sure = math.isfinite(answer.half)
     named = grade(answer.mass, answer.half if sure else math.inf)
-    told = f"{named}: ± {_percent(answer.half / answer.mass)}" if sure else "rough: no upper bound"
+    reported = (
+        f"{named}: ± {_percent(answer.half / answer.mass)}" if sure else "rough: no upper bound"
+    )
     holds = f"95 % interval {between(low, high)}" if sure else "no interval"
     judged = "".join(f'<p class="why">{prose(text)}</p>' for text in answer.judged)
     alert = _alert(answer)
@@ -132,7 +134,7 @@ def answer_block(answer: Answer) -> str:
     return (
         f'<div class="verdict {named}{over}">{alert}'
         f'<p class="answer {named}">{with_half(answer.mass, answer.half)} '
-        f'<span class="grade">{told}</span></p><p class="holds">{holds}</p>{judged}'
+        f'<span class="grade">{reported}</span></p><p class="holds">{holds}</p>{judged}'
         f'<dl class="key">{_payload(answer)}{_share(answer)}'
         f"{_item('vehicle file', answer.file)}{_item('for a better answer', answer.advice)}"
         "</dl></div>"
@@ -141,14 +143,14 @@ def answer_block(answer: Answer) -> str:
 
 def no_answer_block(status: Status, reason: str, remedy: str) -> str:
     """Return the block of a drive that carries no mass, as HTML."""
-    told = f'<p class="why">{prose(sentence(reason))}</p>' if reason else ""
+    reported = f'<p class="why">{prose(sentence(reason))}</p>' if reason else ""
     helps = (
         f'<dl class="key">{_item("what would help", remedy)}</dl>' if remedy else ""
     )  # fmt: skip
     return (
         '<div class="verdict none">'
         f'<p class="answer bad">{escape(capital(STATUS_TEXT[status]))}</p>'
-        f"{told}{helps}</div>"
+        f"{reported}{helps}</div>"
     )
 
 
@@ -198,7 +200,7 @@ def remedy(weighing: MassResult) -> str:
 
 
 def file_worth(vehicle: Vehicle) -> str:
-    """Say what a vehicle file leaves open of any mass, as a 95 % interval."""
+    """Say what a vehicle file leaves uncertain of any mass, as a 95 % interval."""
     made = vehicle.provenance
     if not can_weigh(vehicle):
         return "Not calibrated: it does not say what the torque is worth."

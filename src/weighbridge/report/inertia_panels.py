@@ -218,7 +218,7 @@ def _answer(result: InertiaResult) -> str:
 
 
 def _file_worth(result: InertiaResult) -> str:
-    """Say what the vehicle file leaves open of the sprung mass."""
+    """Say what the vehicle file leaves uncertain of the sprung mass."""
     std = result.ride.force_std
     if std is None:
         return (

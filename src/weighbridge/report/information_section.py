@@ -200,7 +200,7 @@ def shift_times(table: ForceTable) -> Floats:
 
 
 def information_section(weighing: MassResult) -> Section:
-    """Return which part of the drive told the mass."""
+    """Return which part of the drive showed the mass."""
     key, title = "information", "What weighed this vehicle"
     result = weighing.result
     gained = information_gained(result) if result is not None else None

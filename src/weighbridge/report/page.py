@@ -124,16 +124,18 @@ def _judged(
     weighing: MassResult, known: Known | None, comparison: Sequence[MassResult]
 ) -> tuple[str, ...]:
     """Hold a mass against the known one, and against those of other methods."""
-    told = []
+    reported = []
     if known is not None:
-        told.append(_error_told(weighing, known))
+        reported.append(_error_shown(weighing, known))
     if others := apart(weighing, comparison):
         named = ", ".join(f"{w.method} ({plus_minus(w)})" for w in others)
-        told.append(f"Does not fit: {named}. See the comparison of methods before you trust it.")
-    return tuple(told)
+        reported.append(
+            f"Does not fit: {named}. See the comparison of methods before you trust it."
+        )
+    return tuple(reported)
 
 
-def _error_told(weighing: MassResult, known: Known) -> str:
+def _error_shown(weighing: MassResult, known: Known) -> str:
     low, high = weighing.interval(0.95)
     held = "holds it" if low <= known.mass <= high else "does not hold it"
     source = f" ({known.said})" if known.said else ""
@@ -163,10 +165,10 @@ def _summary(weighings: Sequence[MassResult], known: Sequence[Known | None]) -> 
             cells += [(kg(mass), "n"), (error(weighing.mass, mass), "n")]
         cells.append((_outcome(weighing), ""))
         rows.append(cells)
-    told = '<p class="lead screen">Open a drive to see and print it.</p>'
+    reported = '<p class="lead screen">Open a drive to see and print it.</p>'
     over = [w.drive.name for w in weighings if overloaded(w)]
     alert = f'<p class="alert bad">Above the permitted mass: {escape(", ".join(over))}.</p>'
-    return (alert if over else "") + html_table("All drives", heads, rows) + told
+    return (alert if over else "") + html_table("All drives", heads, rows) + reported
 
 
 def drive_sections(

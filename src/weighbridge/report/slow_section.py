@@ -84,7 +84,7 @@ class Wind:
 
     @property
     def seen(self) -> Bools:
-        """(m,) whether the drive told both components."""
+        """(m,) whether the drive showed both components."""
         return np.asarray((self.std < SEEN * WIND_STD).all(axis=1))
 
 
@@ -287,7 +287,7 @@ def stands_out(force: Floats, std: Floats) -> bool:
 
 
 def wind_map(weighing: MassResult, wind: Wind, blind: bool, tiles: Tiles | None) -> Panel:
-    """Draw the wind where the drive told it."""
+    """Draw the wind where the drive showed it."""
     title = "Wind on the map"
     track = positions(weighing)
     if track is None or blind:

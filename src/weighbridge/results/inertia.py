@@ -15,6 +15,7 @@ from weighbridge.inertia.filter import InertiaTrack, Method, inverse_interval
 from weighbridge.inertia.suspension import SuspensionCheck
 from weighbridge.results.writing import check_level, number, write_track
 from weighbridge.signals import Drive, Floats, Problem
+from weighbridge.signals.shown import in_html, plural
 from weighbridge.vehicle.model import Ride, Vehicle
 from weighbridge.visible import visible_json
 
@@ -78,6 +79,14 @@ class InertiaResult:
     model_std: Floats
     segments: tuple[LoadSegment, ...]
     problems: tuple[Problem, ...] = ()
+
+    def _repr_html_(self) -> str:
+        head = f"Inertia of {self.drive.name!r} by {self.method}, vehicle {self.vehicle.name!r}"
+        found = f"{self.status}: {self.reason}"
+        if math.isfinite(self.mass):
+            low, high = self.mass_interval()
+            found = f"{self.mass:.0f} kg, {low:.0f} to {high:.0f} kg with 95 % probability"
+        return in_html((head, found, plural(len(self.warnings), "warning")))
 
     @property
     def reason(self) -> str:

@@ -118,7 +118,7 @@ def align(reference: Signal, other: Signal, *, signed: bool = True) -> Alignment
     if ambiguity > AMBIGUOUS:
         refusal = f"two offsets fit alike (correlations {top:.3f} and {second:.3f})"
     elif not math.isfinite(std):
-        refusal = "the offset cannot be told from the parts of the drive"
+        refusal = "the offset cannot be found from the parts of the drive"
     return Alignment(offset, std, float(rho[best]), ambiguity, overlap, refusal)
 
 

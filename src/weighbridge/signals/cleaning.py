@@ -1,6 +1,6 @@
 """From recorded arrays to signals: finite values on a clock that only rises.
 
-What had to be left out is counted and told, never silently mended.
+What had to be left out is counted and reported, never silently corrected.
 """
 
 from __future__ import annotations
@@ -42,11 +42,11 @@ _FEWEST_RUNS: Final = 8
 """Fewer runs of rising stamps are recordings or clocks set anew, not rows out of order."""
 
 _MIXED: Final = 8.0
-"""Changes from run to run in the order of time, for each run: more, and runs tell of the same
+"""Changes from run to run in the order of time, for each run: more, and runs report the same
 time, so that the clock was set back. Shuffled rows have 2, those sorted as text 1 [-]."""
 
 FEWEST_ROWS: Final = 20
-"""Fewer rows do not tell a coarse clock from repeated rows."""
+"""Fewer rows do not show a coarse clock from repeated rows."""
 
 
 @dataclass(frozen=True, slots=True)

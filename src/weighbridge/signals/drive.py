@@ -72,7 +72,7 @@ class Drive:
     name : the folder's or file's name
     signals : by canonical name, in SI
     info : what is known besides the signals
-    problems : what was mended or is doubtful in the data
+    problems : what was corrected or is questionable in the data
     contents : what raw bus logs hold, decoded or not, in sentences
     units : suffixes of the units that its file or mapping declares, by signal, where they are known
     """
@@ -99,7 +99,7 @@ class Drive:
         return self.signals.get(name)
 
     def has(self, *names: str) -> bool:
-        """Tell whether all the signals are there."""
+        """Return whether all the signals are there."""
         check_texts("names", names)
         return all(name in self.signals for name in names)
 

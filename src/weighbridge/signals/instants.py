@@ -9,7 +9,7 @@ _DATES: Final = 1e8
 """From here on an instant is a date [s since 1970]: no drive lasts three years."""
 
 _LAST: Final = 4e9
-"""No computer tells a later date: the year 2096 [s since 1970]."""
+"""No computer shows a later date: the year 2096 [s since 1970]."""
 
 
 def instant(time: float) -> str:

@@ -20,7 +20,7 @@ PAUSE: Final = 300.0
 """Where nothing is recorded for so long a drive ends, unless the vehicle moves on after it [s]."""
 
 STANDING: Final = 600.0
-"""Where the vehicle stands for so long a drive ends [s]."""
+"""Where the vehicle means so long a drive ends [s]."""
 
 KEPT: Final = 60.0
 """Of such a stop the drives to both sides keep so much at most [s]."""
@@ -31,7 +31,7 @@ DRIVEN: Final = 30.0
 _STILL: Final = 0.5  # slower, the vehicle stands [m/s]
 _MOVING: Final = 3.0  # faster, it moves [m/s]
 _AS_BEFORE: Final = 3.0  # speeds to both sides of a clock that was set [m/s]
-_STANDS_FOR: Final = 2.0  # a sample stands for so long at most [s]
+_STANDS_FOR: Final = 2.0  # a sample means so long at most [s]
 
 # A splice: samples so near in time that differ as no vehicle's do, and so do those around them.
 _NEAR: Final = 5.0  # [s]
@@ -43,7 +43,7 @@ _ALONE: Final = 0.35  # steps around a splice over its own [-]
 _FALLS: Final = 2.0 / 3.0  # engine or ground speed after a splice over that before it [-]
 _FASTEST: Final = 100.0  # between two positions [m/s]
 _FAR: Final = 300.0  # beside that [m]
-_BEYOND: Final = 1.2  # of the way that a speed tells, which may be off [-]
+_BEYOND: Final = 1.2  # of the way that a speed shows, which may be off [-]
 _HIGHER: Final = 8.0  # of the altitude, beside what a road rises in that way [m]
 _STEEPEST: Final = 0.15  # rise of a road over its length [-]
 _COOLED: Final = 10.0  # of the coolant: the engine was parked [K]
@@ -102,7 +102,7 @@ def parted(drive: Drive) -> tuple[Drive, ...]:
 
 
 def numbered(name: str, parts: Sequence[Drive], why: str, idle: int = 0) -> tuple[Drive, ...]:
-    """Name the drives of one recording, and tell of it in each.
+    """Name the drives of one recording, and report it in each.
 
     Parameters
     ----------
@@ -174,7 +174,7 @@ def _speed_jumps(speed: Signal) -> list[Cut]:
     # A source that reads zero for a while jumps as well.
     for side in (before, after):
         stays &= np.nanmin(side, axis=1) > _STILL
-    return _told(time, places[stays], "jumps of the speed")
+    return _reported(time, places[stays], "jumps of the speed")
 
 
 def _leaps(speed: Signal, height: Signal) -> list[Cut]:
@@ -200,7 +200,7 @@ def _leaps(speed: Signal, height: Signal) -> list[Cut]:
         road = _STEEPEST * lasted * float(np.max(size[k : k + 2]))
         if lasted < _NEAR and stays and rise > _HIGHER + road:
             found.append(k)
-    return _told(time, np.array(found, dtype=np.intp), "jumps of speed and height")
+    return _reported(time, np.array(found, dtype=np.intp), "jumps of speed and height")
 
 
 def _possible(speed: Signal) -> Floats:
@@ -242,7 +242,7 @@ def _starts_anew(speed: Signal, witnesses: Sequence[Signal]) -> list[Cut]:
         fall = [_falls(s, float(time[k]), float(time[k + 1])) for s in witnesses]
         if gently and fall and all(fall):
             kept.append(k)
-    return _told(time, np.array(kept, dtype=np.intp), "starts from standstill amid driving")
+    return _reported(time, np.array(kept, dtype=np.intp), "starts from standstill amid driving")
 
 
 def _falls(signal: Signal, before: float, after: float) -> bool:
@@ -277,16 +277,16 @@ def _position_jumps(lat: Signal, longitude: Floats, speed: Signal | None) -> lis
     north = _rise(*_windows(lat.values, places))
     east = _rise(*_windows(longitude, places)) * east_per_angle[places]
     stays = EARTH_RADIUS * np.hypot(north, east) > 0.6 * way[places]
-    return _told(lat.time, places[stays], "jumps of the position")
+    return _reported(lat.time, places[stays], "jumps of the position")
 
 
 def _coolant_jumps(coolant: Signal) -> list[Cut]:
     places = np.flatnonzero((np.diff(coolant.time) < _NEAR) & (np.diff(coolant.values) < -_COOLED))
     stays = _rise(*_windows(coolant.values, places)) < -_COOLED
-    return _told(coolant.time, places[stays], "jumps of the coolant's temperature")
+    return _reported(coolant.time, places[stays], "jumps of the coolant's temperature")
 
 
-def _told(time: Floats, places: NDArray[np.intp], why: str) -> list[Cut]:
+def _reported(time: Floats, places: NDArray[np.intp], why: str) -> list[Cut]:
     return [Cut(float(time[k]), float(time[k + 1]), why) for k in places]
 
 

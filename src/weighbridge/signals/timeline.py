@@ -20,7 +20,7 @@ _LIMITS: Final = (NO_DRIVE, 3600.0, 600.0, 60.0)
 # Span allowed: at least [s], and per time in which something was recorded [-].
 _SPARE: Final = 12 * 3600.0
 _IDLE: Final = 20.0
-# A sample stands for so long at most [s].
+# A sample means so long at most [s].
 _STANDS_FOR: Final = 2.0
 # A clock set forward in motion: all tables go on within so long, and speed as it was.
 _AT_ONCE: Final = 5.0  # [s]
@@ -159,7 +159,7 @@ def _kept(
         for p in parts[k]:
             cut.setdefault(p.clock, []).append((p.first, p.last, by))
     for key in clocks.keys() - there:
-        # A table that lies elsewhere as a whole: whoever compares the tables tells that.
+        # A table that lies elsewhere as a whole: whoever compares the tables shows that.
         own = max((p for part in parts for p in part if p.clock == key), key=_samples)
         cut[key] = [(own.first, own.last, 0.0)]
     signals = {}
@@ -176,7 +176,7 @@ def _kept(
             name, shared[key], np.concatenate([s.values[a:b] for a, b, _ in pieces])
         )
     return replace(drive, signals=signals).with_problems(
-        *_told(clocks, tables, cut, parts, best, moved)
+        *_reported(clocks, tables, cut, parts, best, moved)
     )
 
 
@@ -211,12 +211,12 @@ def _clock_set(
     v0, v1 = float(speed.values[k - 1]), float(speed.values[k])
     if min(v0, v1) < _MOVING or abs(v1 - v0) > _AS_BEFORE:
         return None
-    # The fastest clock tells best how long the step was.
+    # The fastest clock shows best how long the step was.
     fastest = min(float(np.median(np.diff(t))) for t in clocks.values() if t.size > 1)
     return start - end - fastest
 
 
-def _told(
+def _reported(
     clocks: dict[int, Floats],
     tables: dict[int, str],
     cut: dict[int, list[tuple[int, int, float]]],

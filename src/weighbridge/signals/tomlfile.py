@@ -1,4 +1,4 @@
-"""TOML files that people write: every fault is told with its line and a remedy."""
+"""TOML files that people write: every fault is reported with its line and a remedy."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ their part."""
 
 _LARGEST_BITS: Final = int(LARGEST * math.log2(10.0))
 
-# Digits that are read: 800 tell any double from its neighbour, exactly written (IEEE 754).
+# Digits that are read: 800 show any double from its neighbour, exactly written (IEEE 754).
 _MOST_DIGITS: Final = 1000
 
 MOST_COUNTED: Final = 1_000_000_000
@@ -263,7 +263,7 @@ class Section:
 
 
 class Faults:
-    """What is wrong with one file, gathered and told at once.
+    """What is wrong with one file, gathered and reported at once.
 
     Parameters
     ----------
@@ -283,13 +283,13 @@ class Faults:
             self.said.append(str(error))
 
     def refuse(self) -> None:
-        """Raise one error that tells all that was gathered; nothing where there is none."""
+        """Raise one error that shows all that was gathered; nothing where there is none."""
         if self.said:
             raise self.error("; ".join(self.said))
 
 
 def _rational(number: float) -> Fraction:
-    """Read a unit's factor as the simple fraction it stands for, as 1/100 for 0.01."""
+    """Read a unit's factor as the simple fraction it means, as 1/100 for 0.01."""
     simple = Fraction(number).limit_denominator(1_000_000)
     return simple if float(simple) == number else Fraction(number)
 

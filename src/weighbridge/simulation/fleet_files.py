@@ -109,8 +109,8 @@ def write_fleet(
         table.write_csv(part / "truth.csv")
         drives = table.unique("files", keep="first", maintain_order=True)
         drives.select("files", "vehicle", "class", "start").write_csv(part / "drives.csv")
-        told = pl.DataFrame(tickets, schema=TICKETS, orient="row").sort("vehicle", "time")
-        told.write_csv(part / "tickets.csv")
+        reported = pl.DataFrame(tickets, schema=TICKETS, orient="row").sort("vehicle", "time")
+        reported.write_csv(part / "tickets.csv")
     return drives.height
 
 

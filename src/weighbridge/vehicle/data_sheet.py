@@ -1,4 +1,4 @@
-"""What a data sheet leaves open: losses of the driveline, friction of the engine, torque.
+"""What a data sheet leaves uncertain: losses of the driveline, friction of the engine, torque.
 
 All of it is from print, for vehicles that were never calibrated. Losses of a driveline
 have a part in proportion to torque, which is the efficiency here and scales every mass,
@@ -76,7 +76,7 @@ MOST_ACCESSORIES: Final = 0.5
 
 
 def by_data_sheet(vehicle: Vehicle) -> bool:
-    """Whether torque is told by the vehicle, and nothing has calibrated it."""
+    """Whether torque is shown by the vehicle, and nothing has calibrated it."""
     return source_of(vehicle).signed and not vehicle.provenance.torque_fitted
 
 

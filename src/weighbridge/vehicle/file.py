@@ -21,7 +21,7 @@ from weighbridge.errors import ConfigError
 from weighbridge.signals.tomlfile import Faults, Section, read_toml, shortened
 from weighbridge.vehicle.file_keys import SECTIONS, VEHICLE_KEYS, WITNESS_KEYS, Key
 from weighbridge.vehicle.rounding import covariance_texts, rounded_texts
-from weighbridge.vehicle.torque_model import WITNESS_TERMS, WitnessRelation
+from weighbridge.vehicle.torque_model import WITNESS_TERMS, SecondSignalRelation
 from weighbridge.whole import write_whole
 
 FORMAT_VERSION: Final = 1
@@ -38,7 +38,7 @@ class Written(Protocol):
     """A vehicle, as a file holds it: a field for each of its sections and keys."""
 
     @property
-    def witnesses(self) -> tuple[WitnessRelation, ...]:
+    def witnesses(self) -> tuple[SecondSignalRelation, ...]:
         """How the torque's reading goes with other signals of the engine."""
         ...
 
@@ -69,7 +69,7 @@ def load_vehicle(path: str | Path, build: type[Made]) -> Made:
         section = root.section(name)
         if section is None:
             continue
-        told = len(faults.said)
+        reported = len(faults.said)
         values = _values(section, keys, faults)
         with faults.gathered():
             if name == "driveline":
@@ -80,7 +80,7 @@ def load_vehicle(path: str | Path, build: type[Made]) -> Made:
                 section.count("format_version")
         with faults.gathered():
             section.done()
-        if len(faults.said) > told:
+        if len(faults.said) > reported:
             continue
         with faults.gathered():
             _refuse_gaps(section, part, keys, values)
@@ -117,7 +117,7 @@ def _refuse_lost_mapping(root: Section) -> None:
             Section(data, root.name, root.lines, (name,)).fail("mapping", remedy)
 
 
-def _witnesses(root: Section) -> tuple[WitnessRelation, ...]:
+def _witnesses(root: Section) -> tuple[SecondSignalRelation, ...]:
     """Read what other signals of the engine say of the torque's reading."""
     every = root.section("witnesses")
     if every is None:
@@ -132,8 +132,8 @@ def _witnesses(root: Section) -> tuple[WitnessRelation, ...]:
         }
         section.done()
         values["signal"] = signal
-        _refuse_gaps(section, WitnessRelation, WITNESS_KEYS, values)
-        found.append(_built(WitnessRelation, section, values))
+        _refuse_gaps(section, SecondSignalRelation, WITNESS_KEYS, values)
+        found.append(_built(SecondSignalRelation, section, values))
     every.done()
     return tuple(found)
 
@@ -171,8 +171,8 @@ def save_vehicle(
     for name, (_, keys) in SECTIONS.items():
         if name == "provenance" and vehicle.witnesses:
             every = tomlkit.table(is_super_table=True)
-            for witness in vehicle.witnesses:
-                every.add(witness.signal, _table(WITNESS_KEYS, witness, exact=exact))
+            for second_signal in vehicle.witnesses:
+                every.add(second_signal.signal, _table(WITNESS_KEYS, second_signal, exact=exact))
             document.add("witnesses", every)
         part = getattr(vehicle, name)
         if part is None:

@@ -41,8 +41,8 @@ UNSLIPPED: Final = 6.0
 """Speed from which clutch and converter in front of a stepless gearbox are locked [m/s]: they lock
 by 20 km/h."""
 
-TOLD_NEAR: Final = 0.06
-"""A gear told belongs to the gearing its median ratio is this near to [-]."""
+REPORTED_NEAR: Final = 0.06
+"""A gear reported belongs to the gearing its median ratio is this near to [-]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -293,9 +293,9 @@ def reported_gear_numbers(reported: Ints, gearing: Floats, gearings: Floats) -> 
     """Find which gears of the vehicle file the gears are that a gearbox reports.
 
     A file fitted to drives that never used the first gears counts from the
-    lowest one used, and a gearbox from its own first gear. Each gear told is
+    lowest one used, and a gearbox from its own first gear. Each gear reported is
     the gearing that its median ratio lies at; where it lies at none the
-    number is taken as told.
+    number is taken as reported.
 
     Parameters
     ----------
@@ -305,7 +305,7 @@ def reported_gear_numbers(reported: Ints, gearing: Floats, gearings: Floats) -> 
 
     Returns
     -------
-    Number 1..m of each gear told; 0 where it is none of the file's
+    Number 1..m of each gear reported; 0 where it is none of the file's
     """
     numbers = {}
     for k in np.unique(reported[reported >= 1]).tolist():
@@ -314,7 +314,7 @@ def reported_gear_numbers(reported: Ints, gearing: Floats, gearings: Floats) -> 
         if ratio.size >= 5:
             distance = np.abs(np.log(np.median(ratio) / gearings))
             best = int(np.argmin(distance))
-            if distance[best] < TOLD_NEAR:
+            if distance[best] < REPORTED_NEAR:
                 numbers[k] = best + 1
     return numbers
 
@@ -328,7 +328,7 @@ def number_reported_gears(reported: Ints, numbers: Mapping[int, int]) -> Ints:
 
 
 def steady(time: Floats, gearing: Floats, tolerance: Floats) -> Bools:
-    """Tell where the ratio agrees with the one before and the one after.
+    """Return where the ratio agrees with the one before and the one after.
 
     Parameters
     ----------

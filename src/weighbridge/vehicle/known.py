@@ -136,7 +136,7 @@ def _notes(known: Known) -> str:
 
 
 def _refuse(known: Known) -> None:
-    """Tell all that is wrong at once."""
+    """Report all that is wrong at once."""
     faults = Faults()
     faults.said += _wrong_choices(known)
     if known.kind in VEHICLE_CLASSES:

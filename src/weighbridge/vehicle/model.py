@@ -21,9 +21,9 @@ from weighbridge.vehicle.torque_model import (
     LATEST_TORQUE,
     WITNESS_TERMS,
     DraggedReading,
+    SecondSignalRelation,
     Timing,
     TorqueModel,
-    WitnessRelation,
 )
 from weighbridge.visible import visible
 
@@ -73,7 +73,7 @@ class Vehicle:
     mounting: Mounting | None = None
     timing: Timing = field(default_factory=Timing)
     dragged: DraggedReading | None = None
-    witnesses: tuple[WitnessRelation, ...] = ()
+    witnesses: tuple[SecondSignalRelation, ...] = ()
     speed_model: SpeedModel | None = None
     ride: Ride | None = None
     provenance: Provenance = field(default_factory=Provenance)
@@ -86,14 +86,14 @@ class Vehicle:
         for name, (part, optional) in _PARTS.items():
             if not (optional and getattr(self, name) is None):
                 check_type(name, getattr(self, name), part, f"a {part.__name__}")
-        check_all("witnesses", self.witnesses, WitnessRelation, "WitnessRelation")
+        check_all("witnesses", self.witnesses, SecondSignalRelation, "SecondSignalRelation")
         check_choice("class", self.kind, VEHICLE_CLASSES)
         if self.engine is not None:
             check_choice("engine", self.engine, get_args(EngineKind))
         for name in ("tare", "gross"):
             positive(name, getattr(self, name))
             within(name, getattr(self, name), *MASSES, "kg")
-        signals = [witness.signal for witness in self.witnesses]
+        signals = [second_signal.signal for second_signal in self.witnesses]
         if len(set(signals)) < len(signals):
             raise ConfigError(f"each second signal may be named once, got {', '.join(signals)}")
         if self.mapping is not None and visible(self.mapping) != self.mapping:
@@ -178,9 +178,9 @@ __all__ = [
     "Provenance",
     "Ride",
     "RoadLoad",
+    "SecondSignalRelation",
     "SpeedModel",
     "Timing",
     "TorqueModel",
     "Vehicle",
-    "WitnessRelation",
 ]

@@ -1,4 +1,4 @@
-"""How torque follows from what was recorded: model, timing, dragged engine, witnesses."""
+"""How torque follows from what was recorded: model, timing, dragged engine, second signals."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class TorqueModel:
     knot_slopes : that correction at the knots, in the unit of w1
     reference_torque : for "percent" where the drive does not carry it [N m]
     told_reference_torque : what the drives of the calibration said that 100 % are [N m]
-    reading_step : step in which the drives of the calibration told the reading [SI]; None where
+    reading_step : step in which the drives of the calibration reported the reading [SI]; None where
         they showed none
     engine_efficiency : for "air_flow", shaft over fuel power [-]
     noise : standard deviation of the torque from this source [N m]
@@ -204,11 +204,11 @@ class DraggedReading:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class WitnessRelation:
+class SecondSignalRelation:
     """How the reading that torque is made from goes with another signal of the same engine.
 
-    With w the witness and N the engine speed, both over the ends of their ranges, an engine reads
-    ``c0 + c1 w + c2 w N + c3 w^2``, and a motor, by the power of its battery over its speed,
+    With w the second signal and N the engine speed, both over the ends of their ranges, an engine
+    reads ``c0 + c1 w + c2 w N + c3 w^2``, and a motor, by the power of its battery over its speed,
     ``c0 + c1 w + c2 / N``.
 
     Attributes
@@ -218,11 +218,11 @@ class WitnessRelation:
     scatter : standard deviation of the reading about the relation, of means over seconds
     span : range of such means; the unit of both is that of the reading, as `regressor` in
         `weighbridge.vehicle.torque` has it: a share for load, else N m
-    scale_std : by how much the scale of reading over witness differs between drives [-]
-    value_range : values of the witness that the relation has seen, in its own SI unit
+    scale_std : by how much the scale of reading over second signal differs between drives [-]
+    value_range : values of the second signal that the relation has seen, in its own SI unit
     speed_range : engine speeds that it has seen [rad/s]
-    blur, lag : time constant by which the reading is smoother than the witness, and by how much
-        it is later [s]; None where the drives were sampled too slowly
+    blur, lag : time constant by which the reading is smoother than the second signal, and by how
+        much it is later [s]; None where the drives were sampled too slowly
     unexplained : part of the variance of single readings that is left then [-]
     pressure, temperature : of the ambient air [Pa], [K]; None where it was not known
     """
@@ -271,4 +271,4 @@ WITNESS_TERMS: Final[dict[str, int]] = {
     "demanded_torque": 4,
     "battery_current": 3,
 }
-"""Signals that can be a witness, and how many coefficients the relation to each has."""
+"""Signals that can be a second signal, and how many coefficients the relation to each has."""

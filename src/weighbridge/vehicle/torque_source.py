@@ -181,7 +181,8 @@ torque and grow with speed (Heywood, 1988, ch. 13); the full-load curve is smoot
 MOTOR_BETWEEN_STD: Final = 0.006
 """Of a motor's torque that is reported, see `TorqueSource.between_std`. A magnet loses 0.1 % per
 kelvin, and the inverter allows for it roughly. Twelve electric cars of the second model (seeds 9400
-to 9411), calibrated by one drive of two kinds: errors of 1.2 and 1.4 % RMS where 1.0 % was told."""
+to 9411), calibrated by one drive of two kinds: errors of 1.2 and 1.4 % RMS where 1.0 % was
+reported."""
 
 REPORTED: Final = partial(
     TorqueSource,

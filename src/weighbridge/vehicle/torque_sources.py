@@ -149,7 +149,7 @@ _MEASURED: Final = REPORTED(
     title="torque in N m",
     words="torque in N m, as the control unit reports it",
     axis="Recorded torque [N m]",
-    # Told from the currents of a motor; its limit is 5 %.
+    # Reported from the currents of a motor; its limit is 5 %.
     motor_scale_std=0.03,
     motor_between_std=MOTOR_BETWEEN_STD,
 )

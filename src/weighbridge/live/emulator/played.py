@@ -60,10 +60,10 @@ class Played:
         self.parameters = tuple(n for n, names in self._names.items() if names)
         lacking = [names for names in _NEEDED if not any(drive.has(name) for name in names)]
         if lacking:
-            told = " and no ".join(", ".join(names) for names in lacking)
+            missing = " and no ".join(", ".join(names) for names in lacking)
             raise DriveError(
-                f"{drive.name} has no {told}, which an OBD-II adapter sends; give a drive that was "
-                "recorded by OBD-II, or a simulated car"
+                f"{drive.name} has no {missing}, which an OBD-II adapter sends; "
+                "give a drive that was recorded by OBD-II, or a simulated car"
             )
 
     def begin(self) -> None:

@@ -84,14 +84,14 @@ def _opened(path: Path) -> BinaryIO:
     """Open a file to append to, after its last whole line."""
     try:
         if path.is_file() and not is_stream(path):
-            _mend(path)
+            _repair(path)
         # Without a buffer: what is written is in the hands of the system.
         return path.open("ab", buffering=0)
     except OSError as error:
         raise ConfigError(f"{path} cannot be written: {error.strerror or error}") from None
 
 
-def _mend(path: Path) -> None:
+def _repair(path: Path) -> None:
     with path.open("r+b") as file:
         if file.read(1) not in (b"", b"{"):
             raise ConfigError(f"{path} holds no JSON lines; name another file")

@@ -124,7 +124,7 @@ class Topics:
     prefix : first levels of all
     vehicle : its name
     sides : of the limits that are watched
-    own : tells this scale from others, where the name of the vehicle does not
+    own : shows this scale from others, where the name of the vehicle does not
     """
 
     def __init__(
@@ -145,10 +145,10 @@ class Topics:
         withdrawn by an empty message where it is not.
         """
         mass = weighing.mass
-        told = weighing.status is LiveStatus.WEIGHED and 0.0 <= mass <= _HIGHEST
+        reported = weighing.status is LiveStatus.WEIGHED and 0.0 <= mass <= _HIGHEST
         return [
             (self.weighing, json_line(weighing).encode("ascii")),
-            (self.vss, f"{mass:.0f}".encode("ascii") if told else b""),
+            (self.vss, f"{mass:.0f}".encode("ascii") if reported else b""),
         ]
 
     def discovery(self) -> list[tuple[str, bytes]]:
@@ -283,7 +283,7 @@ class Mqtt:
         self._held: LiveWeighing | None = None
         self._stop = Event()
         self._changed = Condition()
-        self._told = False
+        self._reported = False
         self._thread = Thread(target=self._run, name=self.name, daemon=True)
         self._thread.start()
 
@@ -352,11 +352,11 @@ class Mqtt:
 
     def _tell(self, trouble: str) -> None:
         """Log once that the broker is gone, and once that it is back."""
-        if trouble and not self._told:
+        if trouble and not self._reported:
             _logger.warning("%s: %s; messages wait until it is back", self.name, trouble)
-        elif not trouble and self._told:
+        elif not trouble and self._reported:
             _logger.warning("%s is back, %d messages waited", self.name, self.waiting)
-        self._told = bool(trouble)
+        self._reported = bool(trouble)
 
 
 class _Session:
@@ -415,16 +415,16 @@ class _Session:
             room = _WINDOW - len(self._sent)
             found = self._outbox.after(newest, room) if room > 0 else []
             for message in found:
-                told = self._client.publish(message.topic, message.payload, qos=1, retain=True)
+                reported = self._client.publish(message.topic, message.payload, qos=1, retain=True)
                 with self._changed:
-                    self._sent[told.mid] = message.number
+                    self._sent[reported.mid] = message.number
                 newest = message.number
             if not found:
                 with self._changed:
                     self._changed.wait(0.05 if stop.is_set() else 0.5)
         if not self._lost:
-            told = self._client.publish(self._topics.available, b"offline", qos=1, retain=True)
-            told.wait_for_publish(1.0)
+            reported = self._client.publish(self._topics.available, b"offline", qos=1, retain=True)
+            reported.wait_for_publish(1.0)
 
     def end(self) -> None:
         """Close the connection, whatever its state."""

@@ -34,7 +34,7 @@ WINDOW: Final = 1800.0
 MOST: Final = 1800
 """The plot holds so much time [s] and so many points."""
 
-# A page is told of news at most so often, and of life where there is none [s].
+# A page is informed of news at most so often, and of life where there is none [s].
 _GLANCE: Final = 0.25
 _LIFE: Final = 15.0
 
@@ -119,8 +119,8 @@ class History:
         rows = self._points if fresh else islice(self._points, len(self._points) - new, None)
         columns = list(zip(*rows, strict=True)) or [()] * 4
         names = ("time", "mass", "low", "high")
-        told = {n: [_rounded(v) for v in c] for n, c in zip(names, columns, strict=True)}
-        return {"fresh": fresh, **told}
+        reported = {n: [_rounded(v) for v in c] for n, c in zip(names, columns, strict=True)}
+        return {"fresh": fresh, **reported}
 
 
 def _rounded(value: float) -> float | None:
@@ -270,9 +270,9 @@ async def _stream(newest: _Newest) -> AsyncIterator[str]:
     silent = 0.0
     yield "retry: 2000\n\n"
     while not newest.closed:
-        told = newest.after(version, number)
-        if told is not None:
-            version, number, text = told
+        reported = newest.after(version, number)
+        if reported is not None:
+            version, number, text = reported
             silent = 0.0
             yield f"data: {text}\n\n"
         elif silent >= _LIFE:

@@ -39,7 +39,7 @@ _STATUS_STYLE: Final = {
 }
 
 # Probabilities of an overload from which the bar is yellow and red [-].
-_DOUBTFUL: Final = 0.05
+_QUESTIONABLE: Final = 0.05
 _LIKELY: Final = 0.5
 
 # The view is drawn anew at most so often [s].
@@ -115,13 +115,13 @@ class PlainLines:
     def __init__(self, console: Console) -> None:
         self._console = console
         self._news: object = None
-        self._told = float("nan")
+        self._reported = float("nan")
 
     def show(self, weighing: LiveWeighing) -> None:
         """Print a line where one is due."""
-        if not due(weighing, self._told, _period(weighing)) and news(weighing) == self._news:
+        if not due(weighing, self._reported, _period(weighing)) and news(weighing) == self._news:
             return
-        self._told, self._news = weighing.newest, news(weighing)
+        self._reported, self._news = weighing.newest, news(weighing)
         self._console.print(plain_line(weighing), markup=False, highlight=False, soft_wrap=True)
 
     def close(self) -> None:
@@ -240,9 +240,9 @@ def _mass_line(w: LiveWeighing, width: int) -> Text:
     if w.parked:
         line.append(" parked ", style="black on cyan")
     low, high = w.interval()
-    told = f"  {between(low, high)} with 95 %"
-    if known and high - low < float("inf") and line.cell_len + len(told) <= width:
-        line.append(told, style="dim")
+    reported = f"  {between(low, high)} with 95 %"
+    if known and high - low < float("inf") and line.cell_len + len(reported) <= width:
+        line.append(reported, style="dim")
     line.truncate(width)
     return line
 
@@ -280,7 +280,7 @@ def _load_style(w: LiveWeighing) -> str:
     p = w.overload
     if p is None:
         return ""
-    return "red" if p >= _LIKELY else "yellow" if p >= _DOUBTFUL else "green"
+    return "red" if p >= _LIKELY else "yellow" if p >= _QUESTIONABLE else "green"
 
 
 def _signals_style(w: LiveWeighing) -> str:
@@ -317,9 +317,9 @@ def _signal(s: SignalHealth, width: int) -> Text:
     name = visible(s.name)
     line = Text(f"{name if len(name) <= room else name[: room - 1] + '…':<{room}}{tail}")
     line.append(f"{state:<6}", style=style)
-    told = f" {lost} lost"
-    if lost and line.cell_len + len(told) <= width:
-        line.append(told, style="dim")
+    reported = f" {lost} lost"
+    if lost and line.cell_len + len(reported) <= width:
+        line.append(reported, style="dim")
     line.truncate(width, pad=True)
     return line
 

@@ -10,12 +10,12 @@ News = tuple[LiveStatus, bool, tuple[bool, ...]]
 
 
 def news(weighing: LiveWeighing) -> News:
-    """Return what is told at once where it changes: status, parked or not, alerts."""
+    """Return what is reported at once where it changes: status, parked or not, alerts."""
     return weighing.status, weighing.parked, tuple(alert.active for alert in weighing.alerts)
 
 
 def due(weighing: LiveWeighing, last: float, period: float) -> bool:
-    """Tell whether samples came for so long since the last weighing that was told.
+    """Return whether samples came for so long since the last weighing that was reported.
 
     A clock that falls begins anew.
 

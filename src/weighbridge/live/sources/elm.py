@@ -79,7 +79,7 @@ class ElmSource:
         self._probe = probe
 
     def run(self, put: Callable[[Samples], None], stop: Event) -> None:
-        """Ask until told to stop; see `weighbridge.live.source.Source.run`."""
+        """Ask until asked to stop; see `weighbridge.live.source.Source.run`."""
         self.trouble = ""
         with DeviceLock(self.name):
             try:
@@ -164,7 +164,7 @@ class ElmCarrier:
             said = (self._command("ATDPN", _COMMAND) or "").split()
             # A protocol found by itself has an A before its number.
             self.together = bool(said) and said[-1][-1:] in _CAN
-            # One control unit: the adapter need not wait for another, if told how many there are.
+            # One control unit: the adapter need not wait for another, if it knows their number.
             self._counted = len(found) == 1
         return found
 

@@ -70,7 +70,7 @@ class GpsdSource:
         self._port = port
 
     def run(self, put: Callable[[Samples], None], stop: Event) -> None:
-        """Hand over fixes until told to stop; see `weighbridge.live.source.Source.run`."""
+        """Hand over fixes until asked to stop; see `weighbridge.live.source.Source.run`."""
         self.trouble = ""
         link = TcpLink(self._host, self._port)
         gathered = Gathered(put)

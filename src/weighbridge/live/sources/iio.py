@@ -96,10 +96,10 @@ class IioSource:
         self._rate = rate
         self._devices = devices
         self._nodes = nodes
-        self._told = False
+        self._reported = False
 
     def run(self, put: Callable[[Samples], None], stop: Event) -> None:
-        """Hand over readings until told to stop; see `weighbridge.live.source.Source.run`."""
+        """Hand over readings until asked to stop; see `weighbridge.live.source.Source.run`."""
         gathered = Gathered(put)
         folder = self._folder()
         node = self._nodes / folder.name
@@ -158,8 +158,8 @@ class IioSource:
             stop.wait(due - monotonic())
 
     def _tell(self, why: UnbufferedError) -> None:
-        if not self._told:
-            self._told = True
+        if not self._reported:
+            self._reported = True
             _logger.warning(
                 "%s: its buffer cannot be used (%s); every value is read by itself, at less "
                 "even instants",

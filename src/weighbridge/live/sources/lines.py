@@ -70,7 +70,7 @@ class LinesSource:
         self._open = open_reader
 
     def run(self, put: Callable[[Samples], None], stop: Event) -> None:
-        """Hand over what lines say until told to stop; see `weighbridge.live.source.Source.run`."""
+        """Hand over what lines say until asked to stop; see `live.source.Source.run`."""
         gathered = Gathered(put)
         reader = LineReader(self.name)
         with self._open() as read:
@@ -130,7 +130,7 @@ class _UnfitLineError(Exception):
 
 
 class LineReader:
-    """Turns lines into samples; what cannot be understood is counted and told once.
+    """Turns lines into samples; what cannot be understood is counted and reported once.
 
     Parameters
     ----------
@@ -143,7 +143,7 @@ class LineReader:
         self._text = b""
         self._clock = DeviceClock()
         self._columns: dict[str, tuple[str, str] | None] = {}
-        self._told: set[str] = set()
+        self._reported: set[str] = set()
 
     @property
     def renewed(self) -> int:
@@ -225,8 +225,8 @@ class LineReader:
         return found[0].name, found[1]
 
     def _tell(self, key: str, text: str) -> None:
-        if key not in self._told and len(self._told) < 20:
-            self._told.add(key)
+        if key not in self._reported and len(self._reported) < 20:
+            self._reported.add(key)
             _logger.warning("%s: %s", self._name, text)
 
 

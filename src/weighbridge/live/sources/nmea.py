@@ -38,7 +38,7 @@ class SentenceReader:
         self._text = b""
         self._clock = DeviceClock(_DAY)
         self._time = math.nan
-        self._motion_told = False
+        self._motion_reported = False
 
     def read(self, data: bytes, arrived: float) -> list[tuple[float, dict[str, float]]]:
         """Return instants [s] and values [SI] of the sentences that are whole now.
@@ -68,9 +68,9 @@ class SentenceReader:
         """Values of one sentence; as in a file, RMC shows the speed and GGA the place."""
         values: dict[str, float] = {}
         if said.kind == "RMC":
-            self._motion_told = True
+            self._motion_reported = True
             values = _motion(said.motion, "kn")
-        elif said.kind == "VTG" and not self._motion_told:
+        elif said.kind == "VTG" and not self._motion_reported:
             values = _motion(said.motion, "kmh")
         elif said.kind == "GST":
             values = {"gnss_accuracy": said.spread}

@@ -60,7 +60,7 @@ class ObdSource:
         self._probe = probe
 
     def run(self, put: Callable[[Samples], None], stop: Event) -> None:
-        """Ask until told to stop; see `weighbridge.live.source.Source.run`."""
+        """Ask until asked to stop; see `weighbridge.live.source.Source.run`."""
         self.trouble = ""
         with DeviceLock(self.name):
             bus = self._bus.open(_ANSWERS)

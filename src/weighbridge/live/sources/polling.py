@@ -108,7 +108,7 @@ class Poller:
         self._probe = probe
 
     def run(self) -> None:
-        """Ask until told to stop."""
+        """Ask until asked to stop."""
         while not self._stop.is_set():
             volts = self._carrier.voltage()
             if volts is not None and volts < LOW_VOLTAGE:

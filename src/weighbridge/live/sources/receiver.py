@@ -58,7 +58,7 @@ class ReceiverSource:
         self._sends = sends
 
     def run(self, put: Callable[[Samples], None], stop: Event) -> None:
-        """Hand over fixes until told to stop; see `weighbridge.live.source.Source.run`."""
+        """Hand over fixes until asked to stop; see `weighbridge.live.source.Source.run`."""
         self.trouble = ""
         with DeviceLock(self.name):
             link = self._open()

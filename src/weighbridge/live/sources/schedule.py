@@ -188,7 +188,7 @@ class Schedule:
 
 
 class Vigil:
-    """Tells from the answers whether the vehicle is on.
+    """Reports from the answers whether the vehicle is on.
 
     Parameters
     ----------

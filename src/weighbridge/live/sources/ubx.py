@@ -63,7 +63,7 @@ class UbxReader:
         self._data = b""
         self._clock = DeviceClock(_WEEK)
         self._sentences = SentenceReader()
-        self._told = -math.inf
+        self._reported = -math.inf
 
     def read(self, data: bytes, arrived: float) -> list[tuple[float, dict[str, float]]]:
         """Return instants [s] and values [SI] of what is whole now.
@@ -72,11 +72,11 @@ class UbxReader:
         """
         rows = []
         for message in self._messages(data):
-            self._told = arrived
+            self._reported = arrived
             if values := _values(message):
                 rows.append((self._clock.host(1e-3 * message.iTOW, arrived), values))
         sentences = self._sentences.read(data, arrived)
-        return sentences if arrived - self._told > SILENT else rows
+        return sentences if arrived - self._reported > SILENT else rows
 
     def _messages(self, data: bytes) -> list[Any]:
         """Messages that are whole and undamaged; after a damaged one it looks on at once."""

@@ -56,9 +56,10 @@ _SCALE_ROUNDS: Final = 4
 """A wrong scale also bends the attitude: each round finds most of what is left."""
 
 _OPEN: Final = 0.75
-"""Part of a gain that may be scale or squat that is left open in the mass [-], so that an interval
-of 95 % holds where all of it is scale: axes 5 and 10 % off in a car, a van and an electric car
-showed 0.6 to 0.9 of it, and masses were off by 1.1 to 1.8 times the gain, 1.4 in the median."""
+"""Part of a gain that may be scale or squat that stays uncertain in the mass [-], so that an
+interval of 95 % holds where all of it is scale: axes 5 and 10 % off in a car, a van and an
+electric car showed 0.6 to 0.9 of it, and masses were off by 1.1 to 1.8 times the gain, 1.4 in the
+median."""
 
 _OPEN_TYRES: Final = 0.8
 """The same where no GNSS shows the speed's scale, and it may be one of the tyres [-]: an electric
@@ -67,7 +68,7 @@ car on tyres 5 % smaller read 3.4 % of it and weighed 5.6 % light."""
 _CLOSER: Final = 0.6
 """A round that finds more than so much of what the one before found leads nowhere [-]."""
 
-_FALSE_TOLD: Final = 1e-3
+_FALSE_REPORTED: Final = 1e-3
 """A smaller part of false samples is left out without a word [-]."""
 
 
@@ -92,7 +93,7 @@ def navigate(
         if gain is None or motion.mounting is None:
             break
         if not gain.sure:
-            return _doubted(setup, motion, gain)
+            return _uncertain(setup, motion, gain)
         if gain.off > _CLOSER * before:
             break
         before = gain.off
@@ -123,8 +124,8 @@ class _Scale:
     std: float = 0.0
 
 
-def _doubted(setup: Setup, motion: Motion, gain: Gain) -> tuple[Setup, Motion]:
-    """Tell of a gain that may be the sensor's scale or the squat, and widen by a part of it."""
+def _uncertain(setup: Setup, motion: Motion, gain: Gain) -> tuple[Setup, Motion]:
+    """Report a gain that may be the sensor's scale or the squat, and widen by a part of it."""
     mean = float(np.mean(gain.value))
     alone = setup.origin is None
     tyres = phrase("or_tyres") if alone else ""
@@ -133,7 +134,7 @@ def _doubted(setup: Setup, motion: Motion, gain: Gain) -> tuple[Setup, Motion]:
     notes = (*motion.notes, note)
     return (
         replace(setup, scale_std=std, notes=notes),
-        replace(motion, specific_force_scale_std=std, doubted_gain=mean, notes=notes),
+        replace(motion, specific_force_scale_std=std, uncertain_gain=mean, notes=notes),
     )
 
 
@@ -169,7 +170,7 @@ def _mounted(sources: Sources, mounting: Mounting | None, scale: _Scale) -> _Mou
     """
     imu = sources.imu
     notes: tuple[Problem, ...] = ()
-    if imu.false > _FALSE_TOLD:
+    if imu.false > _FALSE_REPORTED:
         notes = (Problem.of("imu.false_samples", share=100.0 * imu.false),)
     if scale.axis is not None:
         accel = scaled(imu.time, imu.accel[:], scale.gains, scale.axis)

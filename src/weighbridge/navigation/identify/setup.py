@@ -87,7 +87,7 @@ class Setup:
         return np.ascontiguousarray(accel), np.ascontiguousarray(gyro)
 
     def is_sure(self, time: Floats) -> Bools:
-        """Tell the instants (n,) at which the mounting is known: no change may be under way."""
+        """Return the instants (n,) at which the mounting is known: no change may be under way."""
         return np.asarray(~unsure(time, self.changes))
 
 

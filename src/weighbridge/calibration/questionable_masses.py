@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 
 from weighbridge.balance import ForceBalance
-from weighbridge.calibration.doubted_motion import doubted_gains
+from weighbridge.calibration.uncertain_motion import uncertain_gains
 from weighbridge.estimators import joint
 from weighbridge.estimators.joint.problem import UNMODELLED
 from weighbridge.messages import Problem, phrase, refused
@@ -17,7 +17,7 @@ from weighbridge.signals import Floats
 from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.torque import source_of
 
-DOUBTED: Final = 0.06
+UNCERTAIN: Final = 0.06
 """A drive that weighs so much more or less than the others, by the file made of all, is reported
 [-]: of nine simulated vehicles the farthest of three drives was 0.03 off, with one mass of three
 20 % off 0.21 to 0.32."""
@@ -32,7 +32,7 @@ OVER: Final = 1.02
 """Mass over the permitted one from which it is reported [-]."""
 
 
-def doubted_masses(
+def questionable_masses(
     vehicle: Vehicle, balances: Sequence[ForceBalance], masses: Sequence[float]
 ) -> list[Problem]:
     """Say which masses of a calibration are uncertain, or motions.
@@ -54,7 +54,7 @@ def doubted_masses(
         for name, kg in zip(names, masses, strict=True)
         if gross is not None and kg > OVER * gross
     ]
-    contradictions += doubted_gains(names, [b.motion for b in balances])
+    contradictions += uncertain_gains(names, [b.motion for b in balances])
     fit = vehicle.provenance.fit
     if fit is None or not fit.refined or len(masses) < 2:
         return contradictions
@@ -72,7 +72,7 @@ def refuse_too_heavy(vehicle: Vehicle, masses: Sequence[float], doubts: Sequence
     ----------
     vehicle : calibrated
     masses : it was calibrated with [kg]
-    doubts : that say that the masses are too heavy; a single sign is told and kept
+    doubts : that say that the masses are too heavy; a single sign is reported and kept
 
     Raises
     ------
@@ -117,7 +117,7 @@ def contradicting(
         apart = float(ratios[k]) / mean - 1.0
         off[k] = apart if abs(apart) > SIGNIFICANT * std else 0.0
     worst = int(np.argmax(np.abs(off)))
-    if abs(off[worst]) <= DOUBTED:
+    if abs(off[worst]) <= UNCERTAIN:
         return []
     # Of two it may be either.
     found: dict[str, Any] = {
@@ -155,7 +155,7 @@ def tared(vehicle: Vehicle, tare: float) -> Vehicle:
     return replace(vehicle, tare=tare, provenance=replace(made, notes=notes))
 
 
-def with_doubts(vehicle: Vehicle, doubts: Sequence[Problem]) -> Vehicle:
-    """Keep in the vehicle file what is to be told of its masses at each weighing."""
+def with_findings(vehicle: Vehicle, doubts: Sequence[Problem]) -> Vehicle:
+    """Keep in the vehicle file what is to be reported of its masses at each weighing."""
     made = vehicle.provenance
     return replace(vehicle, provenance=replace(made, doubts=tuple(d.line for d in doubts)))

@@ -1,4 +1,4 @@
-"""What a live scale doubts by the way its samples come, in sentences."""
+"""What a live scale questions by the way its samples come, in sentences."""
 
 from __future__ import annotations
 

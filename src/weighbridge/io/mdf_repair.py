@@ -63,19 +63,19 @@ _FEW: Final = 4096
 _ROOM: Final = 64
 
 
-class Mended(NamedTuple):
+class Repaired(NamedTuple):
     """A file that is safe to read.
 
     Attributes
     ----------
-    raw : its bytes, with links mended
-    told : records that it speaks of, as far as its groups are known
-    damaged : whether something had to be mended
+    raw : its bytes, with links corrected
+    reported : records that it speaks of, as far as its groups are known
+    damaged : whether something had to be corrected
     unfinished : whether its logger never got to count its records
     """
 
     raw: bytes
-    told: int
+    reported: int
     damaged: bool
     unfinished: bool
 
@@ -99,14 +99,14 @@ class _Block(NamedTuple):
         return self.links[number] if number < len(self.links) else 0
 
 
-def mended(path: Path) -> Mended | None:
-    """Check an MDF file, and mend a copy of it where it is damaged.
+def corrected(path: Path) -> Repaired | None:
+    """Check an MDF file, and correct a copy of it where it is damaged.
 
     Returns
     -------
     None where it can be read as it is, and where it is no MDF file. asammdf reads a large file with
     threads that compare nothing, unless it is given as a stream: so a file whose groups have other
-    data than they tell of is given back as well.
+    data than they report is given back as well.
 
     Raises
     ------
@@ -130,17 +130,17 @@ def mended(path: Path) -> Mended | None:
         damaged = isinstance(file.raw, bytearray)
         if not damaged and file.exact:
             return None
-        return Mended(bytes(file.raw), file.told, damaged, bool(file.flags))
+        return Repaired(bytes(file.raw), file.reported, damaged, bool(file.flags))
 
 
 class _File:
-    """The bytes of a file, copied where something has to be mended."""
+    """The bytes of a file, copied where something has to be corrected."""
 
     def __init__(self, raw: mmap.mmap) -> None:
         self.raw: mmap.mmap | bytearray = raw
         self.size = len(raw)
         (self.flags,) = struct.unpack_from("<H", raw, 60)
-        self.told = 0
+        self.reported = 0
         self.exact = True
         # Whether a chain of blocks ended early.
         self.cut = False
@@ -226,18 +226,18 @@ class _File:
         channel_groups = list(self.chain(group, 1, b"##CG"))
         parts, whole = self.pieces(group.link(2))
         if (self.cut and id_size) or (self.flags and not whole):
-            # Records of unknown size cannot be told apart.
+            # Records of unknown size cannot be distinguished.
             self.link(group, 1)
             self.link(group, 2)
             return
         held = sum(self.plain(part)[0] for part in parts)
-        told = size = 0
+        reported = size = 0
         strings: list[tuple[_Block, list[_Block], bool]] = []
         for cg in channel_groups:
             cycles, flags, samples, invalid = self.unpack(cg, _GROUP)
             size = id_size + samples + invalid
-            told += 0 if flags & _VLSD_GROUP else cycles * size
-            self.told += 0 if flags & _VLSD_GROUP else cycles
+            reported += 0 if flags & _VLSD_GROUP else cycles * size
+            self.reported += 0 if flags & _VLSD_GROUP else cycles
             try:
                 strings += self.described(cg, samples, invalid, max(8 * min(samples, held), _FEW))
             except _LostError:
@@ -245,10 +245,10 @@ class _File:
         if self.flags:
             return
         if whole and all(sound for *_, sound in strings):
-            if not id_size and held < told:
+            if not id_size and held < reported:
                 self.copy()
             self.exact &= bool(id_size) or (
-                held == told and all(self.plain(part)[1] for part in parts)
+                held == reported and all(self.plain(part)[1] for part in parts)
             )
             return
         content = self.content(parts)
@@ -375,7 +375,7 @@ def _inside(
 
 
 def _check_three(raw: mmap.mmap) -> None:
-    """Check MDF 3, whose blocks have links of 4 bytes and tell the place of their data."""
+    """Check MDF 3, whose blocks have links of 4 bytes and show the place of their data."""
     seen: set[int] = set()
 
     def fields(at: int, kind: bytes, form: struct.Struct) -> tuple[Any, ...]:
@@ -392,11 +392,11 @@ def _check_three(raw: mmap.mmap) -> None:
     (group,) = fields(_ID_BLOCK, b"HD", _HEAD_3)
     while group:
         group, channel_group, data, count, id_size = fields(group, b"DG", _DATA_GROUP_3)
-        told = 0
+        reported = 0
         for _ in range(count):
             channel_group, channel, size, cycles = fields(channel_group, b"CG", _CHANNEL_GROUP_3)
             # Records of no size cost nothing in a file, yet a stamp each when read.
-            told += cycles * (id_size + size or 1)
+            reported += cycles * (id_size + size or 1)
             while channel:
                 at = channel
                 length, channel, first, bits = fields(at, b"CN", _CHANNEL_3)
@@ -404,23 +404,25 @@ def _check_three(raw: mmap.mmap) -> None:
                     first += 8 * _MORE_3[1].unpack_from(raw, at)[0]
                 if first + bits > 8 * size:
                     raise ValueError(f"a channel stands outside records of {size} bytes")
-        if told and data + told > len(raw):
-            raise ValueError(f"{told} bytes of data from byte {data} on are more than there are")
+        if reported and data + reported > len(raw):
+            raise ValueError(
+                f"{reported} bytes of data from byte {data} on are more than there are"
+            )
 
 
 def settle(file: Any) -> int:
     """Let no group of an open file have more records than its data can hold; return how many.
 
-    asammdf takes memory for as many as the group tells of.
+    asammdf takes memory for as many as the group reports.
     """
     for group in file.groups:
-        told = group.channel_group
+        reported = group.channel_group
         # Lists of columns hold the invalidation bits apart; MDF 3 has none.
         apart = getattr(group, "uses_ld", False)
-        invalid = 0 if apart else int(getattr(told, "invalidation_bytes_nr", 0))
-        if told.cycles_nr and (size := int(told.samples_byte_nr) + invalid):
+        invalid = 0 if apart else int(getattr(reported, "invalidation_bytes_nr", 0))
+        if reported.cycles_nr and (size := int(reported.samples_byte_nr) + invalid):
             held = sum(int(b.original_size) for b in group.get_data_blocks())
-            told.cycles_nr = min(int(told.cycles_nr), held // size)
+            reported.cycles_nr = min(int(reported.cycles_nr), held // size)
     return sum(int(g.channel_group.cycles_nr) for g in file.groups if g.channels)
 
 

@@ -35,7 +35,7 @@ _CRUISE: Final = 100.0 / 3.6
 """Speed at which gears and road load are given [m/s]."""
 
 _FEWEST_RELIABLE: Final = 2
-"""Calibration drives from which a file is told as good as in the table of docs/accuracy.md."""
+"""Calibration drives from which a file is reported as good as in the table of docs/accuracy.md."""
 
 
 def tell(vehicle: Vehicle) -> list[tuple[str, str]]:

@@ -1,4 +1,4 @@
-"""Other signals of the same engine that bear witness of the reading its torque is made from.
+"""Other signals of the same engine that bear second signal of the reading its torque is made from.
 
 Air, fuel or current that an engine takes go with its torque. How they go with the reading is
 learnt from drives of known mass, so that a later drive shows whether the reading is still what it
@@ -22,23 +22,23 @@ from weighbridge.signals.correlation import correlations
 from weighbridge.signals.interpolation import interpolate
 from weighbridge.signals.robust import robust_fit, robust_fits
 from weighbridge.vehicle.air import standard_pressure
-from weighbridge.vehicle.model import Vehicle, WitnessRelation
+from weighbridge.vehicle.model import SecondSignalRelation, Vehicle
 from weighbridge.vehicle.torque import source_of
 
 WINDOW: Final = 3.0
 """Both sides are averaged over so long, at least three periods of the slowest signal [s]."""
 
 SLOWEST: Final = 2.0
-"""The vehicle drives faster while the engine's witnesses are learnt [m/s]."""
+"""The vehicle drives faster while the engine's second signals are learnt [m/s]."""
 
 SLOWEST_MOTOR: Final = 6.0
 """Battery power over motor speed says little of the torque below this vehicle speed [m/s]."""
 
 BLURS: Final = (0.0, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0)
-"""Time constants that are tried for a reading smoother than its witness [s]."""
+"""Time constants that are tried for a reading smoother than its second signal [s]."""
 
 DELAYS: Final = tuple(float(d) for d in np.arange(-1.0, 1.51, 0.25))
-"""Delays of the reading against its witness that are tried beside [s]."""
+"""Delays of the reading against its second signal that are tried beside [s]."""
 
 SLOW_PERIOD: Final = 1.0
 """Signals sampled more slowly show no blur [s]."""
@@ -51,12 +51,12 @@ FEWEST_MEANS: Final = 40
 
 
 Ranges: TypeAlias = tuple[tuple[float, float], tuple[float, float]]
-"""Lowest and highest value of a witness [SI], and speed of the engine [rad/s]."""
+"""Lowest and highest value of a second signal [SI], and speed of the engine [rad/s]."""
 
 
 @dataclass(frozen=True, slots=True)
-class Witness:
-    """One signal that can bear witness of a torque reading.
+class SecondSignal:
+    """One signal that can bear second signal of a torque reading.
 
     Attributes
     ----------
@@ -107,36 +107,36 @@ LOAD_AIR: Final = ((-1.0, 0.0), (0.0, 0.5))
 # A charge takes the more pressure the warmer the air gets, heated on its way in.
 _PRESSURE_AIR: Final = ((0.0, 0.0), (0.5, 1.0))
 
-WITNESSES: Final = (
-    Witness(
+SECOND_SIGNALS: Final = (
+    SecondSignal(
         "mass_air_flow",
         ("mass_air_flow",),
         _per_turn("mass_air_flow"),
         per_turn=True,
     ),
-    Witness("absolute_load", ("absolute_load",), _as_it_is("absolute_load")),
-    Witness(
+    SecondSignal("absolute_load", ("absolute_load",), _as_it_is("absolute_load")),
+    SecondSignal(
         "intake_pressure", ("intake_pressure",), _as_it_is("intake_pressure"), air=_PRESSURE_AIR
     ),
-    Witness("fuel_rate", ("fuel_rate",), _per_turn("fuel_rate"), enriched=True, per_turn=True),
-    Witness("engine_load", ("engine_load",), _as_it_is("engine_load"), air=LOAD_AIR),
-    Witness("demanded_torque", ("demanded_torque",), _as_it_is("demanded_torque")),
-    Witness("battery_current", ("battery_voltage", "battery_current"), _battery, battery=True),
+    SecondSignal("fuel_rate", ("fuel_rate",), _per_turn("fuel_rate"), enriched=True, per_turn=True),
+    SecondSignal("engine_load", ("engine_load",), _as_it_is("engine_load"), air=LOAD_AIR),
+    SecondSignal("demanded_torque", ("demanded_torque",), _as_it_is("demanded_torque")),
+    SecondSignal("battery_current", ("battery_voltage", "battery_current"), _battery, battery=True),
 )
-"""Every signal that can be a witness."""
+"""Every signal that can be a second signal."""
 
-BY_SIGNAL: Final = {witness.signal: witness for witness in WITNESSES}
+BY_SIGNAL: Final = {second_signal.signal: second_signal for second_signal in SECOND_SIGNALS}
 
 
 @dataclass(frozen=True, slots=True)
 class Rows:
-    """Reading and witness at the stamps of the reading.
+    """Reading and second signal at the stamps of the reading.
 
     Attributes
     ----------
     time : (n,) [s]
     reading : (n,) as the torque source reads it
-    value : (n,) of the witness [SI]
+    value : (n,) of the second signal [SI]
     turning : (n,) speed of engine or motor [rad/s]
     driving : (n,) all are known, and the vehicle drives
     period : of the slowest of them [s]
@@ -168,13 +168,13 @@ class Means:
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """Reading against what a witness shows, ``reading = level + scale (told - told's mean)``.
+    """Reading against what a second signal shows, ``reading = level + scale (told - told's mean)``.
 
     Attributes
     ----------
     scale : [-]
-    level : reading where the witness shows ``predicted``, in the reading's unit
-    predicted : mean of what the witness shows
+    level : reading where the second signal shows ``predicted``, in the reading's unit
+    predicted : mean of what the second signal shows
     """
 
     scale: float
@@ -198,7 +198,7 @@ class Comparison(Line):
 
 @dataclass(frozen=True, slots=True)
 class Following:
-    """How late and how smooth a reading is against its witness.
+    """How late and how smooth a reading is against its second signal.
 
     Attributes
     ----------
@@ -214,26 +214,28 @@ class Following:
     lag: float
 
 
-def rows_of(drive: Drive, vehicle: Vehicle, witness: Witness, later: float = 0.0) -> Rows | None:
-    """Reading and witness of a drive; None where one is missing, or the vehicle is another kind.
+def rows_of(
+    drive: Drive, vehicle: Vehicle, second_signal: SecondSignal, later: float = 0.0
+) -> Rows | None:
+    """Reading and second signal; None where one is missing, or the vehicle is another kind.
 
     Parameters
     ----------
-    drive, vehicle, witness
-    later : by how much the reading is later than the witness, which is moved by it [s]
+    drive, vehicle, second signal
+    later : by how much the reading is later than the second signal, which is moved by it [s]
     """
     source = source_of(vehicle)
     made_of = source.found(drive)
     motor = vehicle.driveline.single_speed
-    # A reading is no witness of itself, and there is none for wheels.
-    if set(made_of) & set(witness.needs) or source.gearing or motor != witness.battery:
+    # A reading is no second signal of itself, and there is none for wheels.
+    if set(made_of) & set(second_signal.needs) or source.gearing or motor != second_signal.battery:
         return None
     name = made_of[0]
     turning_of = drive.get("engine_speed") or (drive.get("vehicle_speed") if motor else None)
     speed = drive.speed
-    if drive.missing((name, *witness.needs)) or turning_of is None or speed is None:
+    if drive.missing((name, *second_signal.needs)) or turning_of is None or speed is None:
         return None
-    used = [drive.signals[n] for n in (name, *witness.needs)] + [turning_of, speed]
+    used = [drive.signals[n] for n in (name, *second_signal.needs)] + [turning_of, speed]
     if min(map(len, used)) < FEWEST_MEANS:
         return None
     time = drive.signals[name].time
@@ -246,7 +248,7 @@ def rows_of(drive: Drive, vehicle: Vehicle, witness: Witness, later: float = 0.0
     steady = replace(turning_of, values=median_filter(turning_of.values, 3, mode="nearest"))
     moved = time - later
     turning = steady.at(moved) * gearing
-    value = witness.of(drive, moved, turning)
+    value = second_signal.of(drive, moved, turning)
     driving = np.isfinite(reading) & np.isfinite(value) & np.isfinite(turning)
     least = SLOWEST_MOTOR if motor else SLOWEST
     driving &= np.nan_to_num(speed.at(moved)) > least
@@ -256,20 +258,20 @@ def rows_of(drive: Drive, vehicle: Vehicle, witness: Witness, later: float = 0.0
     return Rows(time, reading, np.nan_to_num(value), np.nan_to_num(turning), driving, period)
 
 
-def terms(witness: Witness, value: Floats, turning: Floats, ranges: Ranges) -> Floats:
+def terms(second_signal: SecondSignal, value: Floats, turning: Floats, ranges: Ranges) -> Floats:
     """Columns of the relation (n, k); see `weighbridge.vehicle.model.WitnessRelation`."""
     (low, high), (_, fastest) = ranges
     w = value / max(abs(low), abs(high), 1e-300)
     speed = turning / fastest
-    if witness.battery:
+    if second_signal.battery:
         return np.column_stack([np.ones_like(w), w, 1.0 / np.maximum(speed, 1e-3)])
     return np.column_stack([np.ones_like(w), w, w * speed, w**2])
 
 
-def means(rows: Rows, witness: Witness, ranges: Ranges) -> Means:
+def means(rows: Rows, second_signal: SecondSignal, ranges: Ranges) -> Means:
     """Average over windows that lie in the ranges with all their samples.
 
-    The witness chooses the windows, not the reading: what is wrong with the reading must not
+    The second signal chooses the windows, not the reading: what is wrong with the reading must not
     choose what it is judged by.
     """
     value_range, speed_range = ranges
@@ -286,23 +288,23 @@ def means(rows: Rows, witness: Witness, ranges: Ranges) -> Means:
     def mean(x: Floats) -> Floats:
         return np.asarray(np.bincount(place, np.nan_to_num(x))[whole] / count[whole])
 
-    columns = terms(witness, rows.value, rows.turning, ranges)
+    columns = terms(second_signal, rows.value, rows.turning, ranges)
     averaged = np.column_stack([mean(column) for column in columns.T])
     return Means(mean(rows.time), mean(rows.reading), averaged)
 
 
-def ranges_of(relation: WitnessRelation) -> Ranges:
+def ranges_of(relation: SecondSignalRelation) -> Ranges:
     """Ranges that a relation has seen."""
     return relation.value_range, relation.speed_range
 
 
-def predicted_by(relation: WitnessRelation, rows: Means) -> Floats:
-    """Reading that a witness shows (m,)."""
+def predicted_by(relation: SecondSignalRelation, rows: Means) -> Floats:
+    """Reading that a second signal shows (m,)."""
     return np.asarray(rows.terms @ np.array(relation.coefficients))
 
 
 def line_of(reading: Floats, predicted: Floats) -> Line:
-    """Fit a scale and a level of the reading against what a witness shows.
+    """Fit a scale and a level of the reading against what a second signal shows.
 
     Parameters
     ----------
@@ -348,12 +350,14 @@ def compare(reading: Floats, predicted: Floats) -> Comparison:
     return Comparison(line.scale, line.level, line.predicted, float(scale_std), float(level_std))
 
 
-def follow(rows: Rows, witness: Witness, relation: WitnessRelation) -> Following | None:
-    """Find how late and how smooth the reading is against what the witness shows.
+def follow(
+    rows: Rows, second_signal: SecondSignal, relation: SecondSignalRelation
+) -> Following | None:
+    """Find how late and how smooth the reading is against what the second signal shows.
 
     Parameters
     ----------
-    rows, witness
+    rows, second signal
     relation : of which the ranges and the blur are taken
 
     Returns
@@ -365,7 +369,7 @@ def follow(rows: Rows, witness: Witness, relation: WitnessRelation) -> Following
         return None
     value = np.clip(rows.value, *relation.value_range)
     turning = np.clip(rows.turning, *relation.speed_range)
-    predicted = terms(witness, value, turning, ranges_of(relation)) @ np.array(
+    predicted = terms(second_signal, value, turning, ranges_of(relation)) @ np.array(
         relation.coefficients
     )
     period = float(np.median(np.diff(rows.time)))

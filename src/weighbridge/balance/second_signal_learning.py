@@ -1,4 +1,4 @@
-"""What a calibration learns of the witnesses of its torque reading."""
+"""What a calibration learns of the second signals of its torque reading."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from weighbridge.balance.disagreement import accepted_scales, difference, judged
-from weighbridge.balance.witness import (
+from weighbridge.balance.second_signal import (
     FEWEST_MEANS,
-    WITNESSES,
+    SECOND_SIGNALS,
     Rows,
-    Witness,
+    SecondSignal,
     air_of,
     compare,
     follow,
@@ -24,15 +24,15 @@ from weighbridge.balance.witness import (
 from weighbridge.messages import Problem
 from weighbridge.signals import Drive, Floats
 from weighbridge.signals.robust import robust_fit, spread
-from weighbridge.vehicle.model import Vehicle, WitnessRelation
+from weighbridge.vehicle.model import SecondSignalRelation, Vehicle
 from weighbridge.vehicle.torque import source_of
 
 CLOSED: Final = 0.15
-"""Part of the witness's range, from its low end, where fuel is cut or the throttle closed [-]:
-there air still passes, and the reading lies on its floor."""
+"""Part of the second signal's range, from its low end, where fuel is cut or the throttle closed
+[-]: there air still passes, and the reading lies on its floor."""
 
 FROM: Final = tuple(float(part) for part in np.arange(0.6, CLOSED - 0.01, -0.05))
-"""Parts of the witness's range, from its low end, from which the relation is tried [-]."""
+"""Parts of the second signal's range, from its low end, from which the relation is tried [-]."""
 
 OUTLYING: Final = 6.0
 """A mean so many usual scatters off the relation belongs to another state of the engine [-],"""
@@ -41,19 +41,19 @@ FINEST: Final = 0.005
 """where a scatter is at least this part of the reading's range [-]."""
 
 STRAY: Final = 0.1
-"""Where a larger part of the means is of another state, a witness shows nothing [-]."""
+"""Where a larger part of the means is of another state, a second signal shows nothing [-]."""
 
 FEWEST_LEARNT: Final = 100
 """Means from which a relation is learnt: five minutes of pulling."""
 
 SCATTERED: Final = 0.06
-"""A witness about whose relation the reading scatters by more than this part of its range is
+"""A second signal about whose relation the reading scatters by more than this part of its range is
 none [-]: means of petrol engines and of a battery scattered by 0.01 to 0.03 in simulated and
 recorded drives; load over air flow of two recorded diesels by 0.18 to 0.43."""
 
 EXPLAINED: Final = 0.85
-"""A witness explains this part of the variance of the reading at least [-]: the recorded petrol
-engine's 0.95, a battery's 0.89 and more, the diesels' 0.01 to 0.77."""
+"""A second signal explains this part of the variance of the reading at least [-]: the recorded
+petrol engine's 0.95, a battery's 0.89 and more, the diesels' 0.01 to 0.77."""
 
 SCALE_STD: Final = 0.022
 """Standard deviation of the scale between drives of one vehicle, at least [-]: 67 recorded trips
@@ -61,10 +61,10 @@ of a petrol car (load by intake pressure, relations learnt on three others) had 
 19 of 20 pairs, 22 trips of an electric car by its battery 0.97 to 1.02."""
 
 
-def learn_witnesses(
+def learn_second_signals(
     drives: Sequence[Drive], vehicle: Vehicle
-) -> tuple[tuple[WitnessRelation, ...], tuple[Problem, ...]]:
-    """Learn from drives of known mass how the torque's reading goes with its witnesses.
+) -> tuple[tuple[SecondSignalRelation, ...], tuple[Problem, ...]]:
+    """Learn from drives of known mass how the torque's reading goes with its second signals.
 
     Parameters
     ----------
@@ -73,31 +73,31 @@ def learn_witnesses(
 
     Returns
     -------
-    relations : of the witnesses that every drive has and that explain the reading well
-    doubts : drives that contradict each other, one for each witness
+    relations : of the second signals that every drive has and that explain the reading well
+    doubts : drives that contradict each other, one for each second signal
     """
     relations, doubts = [], []
-    for witness in WITNESSES:
-        every = [rows_of(drive, vehicle, witness) for drive in drives]
+    for second_signal in SECOND_SIGNALS:
+        every = [rows_of(drive, vehicle, second_signal) for drive in drives]
         rows = [r for r in every if r is not None]
         if len(rows) < len(drives):
             continue
         airs = [air_of(drive, drive.start, drive.end) for drive in drives]
-        doubt = contradiction(drives, rows, airs, witness, vehicle)
+        doubt = contradiction(drives, rows, airs, second_signal, vehicle)
         if doubt is not None:
             doubts.append(doubt)
             continue
-        if (relation := learn(rows, airs, witness)) is not None:
+        if (relation := learn(rows, airs, second_signal)) is not None:
             relations.append(relation)
     return tuple(relations), tuple(doubts)
 
 
 class _Followed(NamedTuple):
-    """Means of a range in which the reading follows the witness.
+    """Means of a range in which the reading follows the second signal.
 
     Attributes
     ----------
-    value_range : of the witness [SI]
+    value_range : of the second signal [SI]
     columns, reading : (m, k), (m,) of the means
     found : (k,) coefficients
     """
@@ -125,7 +125,7 @@ def contradiction(
     drives: Sequence[Drive],
     rows: Sequence[Rows],
     airs: Sequence[tuple[float, float]],
-    witness: Witness,
+    second_signal: SecondSignal,
     vehicle: Vehicle,
 ) -> Problem | None:
     """Say which drives of a calibration contradict each other; None if none.
@@ -134,15 +134,15 @@ def contradiction(
     ----------
     drives
     rows, airs : of each, as of `learn`
-    witness, vehicle
+    second signal, vehicle
     """
     source = vehicle.torque.of_source.name
     for i, first in enumerate(rows):
-        relation = learn([first], [airs[i]], witness)
+        relation = learn([first], [airs[i]], second_signal)
         if relation is None:
             continue
         for j, second in enumerate(rows):
-            part = means(second, witness, ranges_of(relation))
+            part = means(second, second_signal, ranges_of(relation))
             if i == j or part.time.size < FEWEST_MEANS:
                 continue
             accepted = accepted_scales(source, relation, airs[j])
@@ -153,7 +153,7 @@ def contradiction(
                     "calibration.drives_contradict",
                     first=drives[i].name,
                     second=drives[j].name,
-                    witness=witness.signal,
+                    witness=second_signal.signal,
                     reading=reading,
                     by=difference(finding),
                 )
@@ -161,15 +161,15 @@ def contradiction(
 
 
 def learn(
-    rows: Sequence[Rows], airs: Sequence[tuple[float, float]], witness: Witness
-) -> WitnessRelation | None:
-    """Fit the relation to one witness; None where it does not explain the reading.
+    rows: Sequence[Rows], airs: Sequence[tuple[float, float]], second_signal: SecondSignal
+) -> SecondSignalRelation | None:
+    """Fit the relation to one second signal; None where it does not explain the reading.
 
     Parameters
     ----------
     rows : of each drive
     airs : pressure and temperature of the air of each drive [Pa], [K]; NaN where unknown
-    witness
+    second signal
     """
     value = np.concatenate([r.value[r.driving] for r in rows])
     turning = np.concatenate([r.turning[r.driving] for r in rows])
@@ -179,9 +179,9 @@ def learn(
     slow, fast = np.percentile(turning, [1.0, 99.0])
     speed_range = (float(0.95 * slow), float(1.05 * fast))
     best: _Followed | None = None
-    for begin in [0.0] if witness.battery else FROM:
+    for begin in [0.0] if second_signal.battery else FROM:
         ends = (float(low + begin * (high - low)), float(high + 0.05 * (high - low)))
-        parts = [means(r, witness, (ends, speed_range)) for r in rows]
+        parts = [means(r, second_signal, (ends, speed_range)) for r in rows]
         reading = np.concatenate([p.reading for p in parts])
         columns = np.vstack([p.terms for p in parts])
         if reading.size < FEWEST_LEARNT:
@@ -203,8 +203,8 @@ def learn(
     own = compare(reading, predicted)
     known = [np.array(x) for x in zip(*airs, strict=True)]
     pressure, temperature = (float(np.mean(x)) if np.isfinite(x).all() else None for x in known)
-    relation = WitnessRelation(
-        signal=witness.signal,
+    relation = SecondSignalRelation(
+        signal=second_signal.signal,
         coefficients=tuple(map(float, found)),
         scatter=max(scatter, 1e-6 * span),
         span=span,
@@ -214,7 +214,7 @@ def learn(
         pressure=pressure,
         temperature=temperature,
     )
-    found_in = [f for r in rows if (f := follow(r, witness, relation)) is not None]
+    found_in = [f for r in rows if (f := follow(r, second_signal, relation)) is not None]
     if not found_in:
         return relation
     return replace(

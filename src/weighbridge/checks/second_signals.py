@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from weighbridge.balance.disagreement import DOUBTFUL, Finding, difference, findings
-from weighbridge.balance.witness import BY_SIGNAL
+from weighbridge.balance.disagreement import QUESTIONABLE, Finding, difference, findings
+from weighbridge.balance.second_signal import BY_SIGNAL
 from weighbridge.checks.frozen import frozen
 from weighbridge.checks.steps import check_steps
 from weighbridge.messages import phrase
@@ -20,58 +20,60 @@ from weighbridge.vehicle.torque import source_of
 
 
 def check_reading(drive: Drive, vehicle: Vehicle | None) -> tuple[Problem, ...]:
-    """Hold the torque's reading against its witnesses, and against the steps of the calibration.
+    """Compare the torque's reading with its second signals, and the steps of the calibration.
 
-    Where the reading was altered after it was sent, a witness that doubts it is believed.
+    Where the reading was altered after it was sent, a second signal that questions it is believed.
 
     Parameters
     ----------
     drive : without samples that are known to be false
-    vehicle : with the witnesses of its calibration; None where there is none
+    vehicle : with the second signals of its calibration; None where there is none
     """
-    found = witnessed(drive, vehicle)
+    found = compared(drive, vehicle)
     steps = tuple(check_steps(drive, vehicle, found))
-    return (*steps, *check_witnesses(drive, vehicle, found, altered=bool(steps)))
+    return (*steps, *check_second_signals(drive, vehicle, found, altered=bool(steps)))
 
 
-def witnessed(drive: Drive, vehicle: Vehicle | None) -> tuple[Finding, ...]:
-    """What the witnesses of a vehicle file say of the reading; nothing where there are none."""
+def compared(drive: Drive, vehicle: Vehicle | None) -> tuple[Finding, ...]:
+    """What the second signals of a vehicle file say of the reading; nothing without any."""
     if vehicle is None or not vehicle.witnesses:
         return ()
-    return findings(_thawed(drive, vehicle), vehicle)
+    return findings(_without_frozen(drive, vehicle), vehicle)
 
 
-def check_witnesses(
+def check_second_signals(
     drive: Drive,
     vehicle: Vehicle | None,
     found: tuple[Finding, ...] | None = None,
     *,
     altered: bool = False,
 ) -> tuple[Problem, ...]:
-    """Hold the torque's reading against the witnesses of the vehicle file.
+    """Hold the torque's reading against the second signals of the vehicle file.
 
-    One witness that agrees with the reading clears it: those that do not are then off themselves.
+    One that agrees with the reading clears it: those that do not are then off themselves.
 
     Parameters
     ----------
     drive : without samples that are known to be false
-    vehicle : with the witnesses of its calibration; None where there is none
+    vehicle : with the second signals of its calibration; None where there is none
     found : what they say, if it is known already
     altered : the reading's steps say that it was altered after it was sent
 
     Returns
     -------
-    Problems, of the reading, or of witnesses that are off
+    Problems, of the reading, or of second signals that are off
     """
-    found = witnessed(drive, vehicle) if found is None else found
+    found = compared(drive, vehicle) if found is None else found
     if vehicle is None or not found:
         return ()
     reading = source_of(vehicle).found(drive)[0]
     off = [f for f in found if f.verdict != "agrees"]
     # What only the unknown air makes agree clears nothing.
-    agree = [f.signal for f in found if f.verdict == "agrees" and abs(f.scale - 1.0) <= DOUBTFUL]
+    agree = [
+        f.signal for f in found if f.verdict == "agrees" and abs(f.scale - 1.0) <= QUESTIONABLE
+    ]
     if agree and not _outvoted(off):
-        return tuple(_witness_off(reading, f, agree) for f in off)
+        return tuple(_second_signal_off(reading, f, agree) for f in off)
     if not off:
         return ()
     worst = max(off, key=lambda f: (f.verdict == "serious", abs(f.scale - 1.0)))
@@ -80,8 +82,8 @@ def check_witnesses(
     return (_reading_off(reading, vehicle, worst, together, len(off), serious=serious),)
 
 
-def _thawed(drive: Drive, vehicle: Vehicle) -> Drive:
-    """Leave out where a witness froze: it shows nothing there."""
+def _without_frozen(drive: Drive, vehicle: Vehicle) -> Drive:
+    """Leave out where a second signal froze: it shows nothing there."""
     for name in {n for relation in vehicle.witnesses for n in BY_SIGNAL[relation.signal].needs}:
         signal = drive.get(name)
         marked = frozen(drive, name) if signal is not None else None
@@ -92,9 +94,9 @@ def _thawed(drive: Drive, vehicle: Vehicle) -> Drive:
 
 
 def _outvoted(off: Sequence[Finding]) -> bool:
-    """Say whether two witnesses are off by the same: then it is the reading."""
+    """Say whether two second signals are off by the same: then it is the reading."""
     scales = sorted(f.scale for f in off if f.scaled and f.blur == 0.0 and not _part(f))
-    return any(b - a < DOUBTFUL for a, b in pairwise(scales))
+    return any(b - a < QUESTIONABLE for a, b in pairwise(scales))
 
 
 def _reading_off(
@@ -106,7 +108,7 @@ def _reading_off(
     *,
     serious: bool,
 ) -> Problem:
-    """Say by how much the reading is off, by which witnesses, and what to do."""
+    """Say by how much the reading is off, by which second signals, and what to do."""
     names = " and ".join(f.signal for f in together)
     at = _span(worst)
     if worst.blur > 0.0:
@@ -146,7 +148,7 @@ def _reading_off(
     )
 
 
-def _witness_off(reading: str, finding: Finding, agree: Sequence[str]) -> Problem:
+def _second_signal_off(reading: str, finding: Finding, agree: Sequence[str]) -> Problem:
     if finding.blur > 0.0:
         how = phrase("follows_it", reading=reading, blur=finding.blur)
     else:
@@ -169,7 +171,7 @@ def _witness_off(reading: str, finding: Finding, agree: Sequence[str]) -> Proble
 
 
 def _span(finding: Finding) -> dict[str, Any]:
-    """Where in the drive a witness is off [s]; nothing where all the time."""
+    """Where in the drive a second signal is off [s]; nothing where all the time."""
     edges = {"start": finding.start, "end": finding.end}
     return {name: edge for name, edge in edges.items() if np.isfinite(edge)}
 

@@ -27,7 +27,7 @@ ENDS: Final = 60.0
 """A signal that ends, or begins, so long before, or after, the rest is reported [s]."""
 
 
-def mended(drive: Drive, vehicle: Vehicle | None = None) -> Drive:
+def corrected(drive: Drive, vehicle: Vehicle | None = None) -> Drive:
     """Return the drive without samples of torque, engine and vehicle speed that are false.
 
     Left out are values that freeze, and isolated dropouts. Each makes a problem. Signals that a
@@ -115,14 +115,14 @@ def _without_ends(drive: Drive, name: str, vehicle: Vehicle | None) -> Drive:
         floor = min(dragged.level) + 3.0 * dragged.scatter
         if floor < 0.0 <= float(signal.values.min()):
             # What may be the size of a negative reading is as uncertain as a zero.
-            doubtful = signal.values <= 3.0 * dragged.scatter - min(dragged.level)
-            marked = marked | doubtful
+            questionable = signal.values <= 3.0 * dragged.scatter - min(dragged.level)
+            marked = marked | questionable
             notes.append(
                 Problem.of(
                     "torque.sign_lost",
                     name,
                     lowest=show(name, min(dragged.level)),
-                    count=np.count_nonzero(doubtful),
+                    count=np.count_nonzero(questionable),
                 )
             )
     if not notes or marked.all():
@@ -160,7 +160,7 @@ def _without(signal: Signal, marked: Bools) -> Signal:
 
 
 def _ends(drive: Drive, names: list[str]) -> list[Problem]:
-    """Tell of signals that end long before the drive, or begin long after."""
+    """Report signals that end long before the drive, or begin long after."""
     ends = [s.time[-1] for s in drive.signals.values() if len(s) > 10]
     starts = [s.time[0] for s in drive.signals.values() if len(s) > 10]
     notes: list[Problem] = []
