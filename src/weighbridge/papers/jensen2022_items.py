@@ -54,7 +54,7 @@ _EQUATIONS: Final = (
               why="a ratio more than 6 % from every gear has none: the clutch slips there"),
     *_equations((12, 13, 14), "pymap3d"),
     _equation(15, "pymap3d", why="the fraction is lost in the text at hand: a over the root"),
-    _equation(16, "pymap3d, `papers/jensen2022_filter.py`",
+    _equation(16, "pymap3d, `navigation/printed.py`",
               tolerance="1 µm: differences of 6000 km"),
     _equation(17, "`kernels/rotation.py`", why=_AXES),
     _equation(18, _FILTER, what="numbers of the state"),
