@@ -46,6 +46,7 @@ class TrainingSettings:
     grid : solve on the grid of Table 5; the least squares with its limits else
     grid_drag_area, grid_rolling, grid_engine, grid_wheels : lower limit, upper limit and step of
         C_d A [m^2], C_r [-], I_e and I_w [kg m^2] in Table 5
+    shifts : rows of shifts and of a slipping clutch count, as in the paper
     gear_width : half width of the intervals of eq. 50 over their centre [-]
     filter : noise, start and windows of the navigation
     """
@@ -56,6 +57,7 @@ class TrainingSettings:
     grid_rolling: tuple[float, float, float] = (0.002, 0.030, 0.002)
     grid_engine: tuple[float, float, float] = (0.02, 1.00, 0.02)
     grid_wheels: tuple[float, float, float] = (2.0, 12.0, 1.0)
+    shifts: bool = True
     gear_width: float = 0.02
     filter: PrintedFilterSettings = field(default_factory=PrintedFilterSettings)
 
@@ -145,6 +147,8 @@ def calibrate_as_printed(
     balance = recording.balance(0.0)
     table = balance.table
     used = pulling(balance) & np.isfinite(recording.reading)
+    if not settings.shifts:
+        used &= ~np.isin(table.reason, (Reason.SHIFTING, Reason.CLUTCH_SLIPPING))
     rows = build_rows(
         table,
         recording.reading,

@@ -96,6 +96,7 @@ PAPER_RATE: Final = 4.0
 
 def parameters(settings: RlsSettings, period: float) -> kernel.RlsParams:
     """Make the kernel's parameters for rows ``period`` apart [s]."""
+    settings = settings.effective
     forgetting = settings.forgetting ** (PAPER_RATE * period)
     return kernel.RlsParams(
         forgetting=forgetting,

@@ -124,7 +124,8 @@ class Reproduction:
     calibration : ours, from the separate drive
     car : that of ``calibration``, with a tare
     printed_car : by the paper's rules, from the same drive
-    control : by the paper's rules, from the same drive with nothing but eq. 1 acting on the car
+    control : by the paper's rules, from the same drive with nothing but eq. 1 acting on the car,
+        rows of shifts left out
     ratio_errors, printed_ratio_errors : (7,) relative, of the gearings [-]
     drives : the 18 drives by our ``rls``, the wind unknown as in the paper
     printed : the same drives by the paper's rules, the wind unknown
@@ -188,7 +189,9 @@ def reproduce(
     cars = _Cars(car, train(unaware, mass, settings.printed))
     ideal = simulate_car(Conditions(ideal=True).of(usual))
     control = train(
-        without_weather(ideal.drive), float(np.mean(ideal.truth.mass)), settings.printed
+        without_weather(ideal.drive),
+        float(np.mean(ideal.truth.mass)),
+        replace(settings.printed, shifts=False),
     )
     if progress:
         progress(1, total)
