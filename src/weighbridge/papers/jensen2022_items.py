@@ -131,7 +131,7 @@ _LATE: Final = (
 )
 _ROAD: Final = with_units(PAPER_ROAD, ROAD_UNITS)
 _STEP: Final = "one step of the grid of Table 5: C_d A 0.05, C_r 0.002, I_e 0.02"
-_TWO_STEPS: Final = "two steps of the grid, 2 kg m²: one step of I_e moves I_w by as much"
+_TWO_STEPS: Final = "two steps of the grid, 2 kg m²: one step of I_e moves I_w by two"
 _LIKE_TRUE: Final = f"near the true ones; of the paper's car {_ROAD}"
 _LIMITS: Final = (
     "the zero of the accelerometer, alone, and the wind take C_d A to the grid's limit; where "
