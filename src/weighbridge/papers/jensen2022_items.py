@@ -138,7 +138,7 @@ _LIMITS: Final = (
     "eq. 1 alone acts it is found"
 )
 _WHEELS: Final = (
-    "a tenth of the rows are shifts, where eq. 1 in one gear does not hold: they alone take I_w "
+    "a tenth of the rows are shifts, where eq. 1 in one gear does not hold; they alone take I_w "
     "to the limit, effects off as well"
 )
 _NO_SHIFTS: Final = f"{_IDEAL} --set printed.shifts=false"
