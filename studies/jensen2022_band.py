@@ -21,6 +21,7 @@ from weighbridge.calibration.run import run_calibration
 from weighbridge.calibration.settings import CalibrationSettings
 from weighbridge.estimators.rls import RlsSettings, estimate
 from weighbridge.estimators.track import MassTrack
+from weighbridge.navigation.printed import PrintedFilterSettings
 from weighbridge.papers.jensen2022_drives import (
     TABLE_B1,
     Conditions,
@@ -28,11 +29,10 @@ from weighbridge.papers.jensen2022_drives import (
     scenario,
     without_weather,
 )
-from weighbridge.papers.jensen2022_filter import PrintedFilterSettings
 from weighbridge.papers.jensen2022_judged import BAND, DriveResult, judge, judge_track
 from weighbridge.papers.jensen2022_printed import (
     PrintedSettings,
-    calibrate_as_printed,
+    train,
     weigh_as_printed,
 )
 from weighbridge.papers.jensen2022_reproduction import Reproduction, reproduce
@@ -123,7 +123,7 @@ def causes(done: Sequence[Row], drives: Sequence[int]) -> Iterator[Row]:
     drive, mass = trained(CAUSES)
     straight = CalibrationSettings(method="rls", curved=False)
     ours = run_calibration(drive, mass, settings=straight).vehicle
-    cars = {name: calibrate_as_printed(drive, mass, s) for name, s in PRINTED.items()}
+    cars = {name: train(drive, mass, s) for name, s in PRINTED.items()}
     there = {(r["variant"], r["row"]) for r in done}
     for row in (row for row in TABLE_B1 if row.number in drives):
         for variant, (_, conditions) in CONDITIONS.items():

@@ -67,7 +67,7 @@ def test_json_has_every_row(weighbridge, tmp_path, monkeypatch):
     assert [r["verdict"] for r in found] == ["agrees", "differs"]
     assert set(found[0]) == {
         "paper", "item", "what", "conditions", "printed", "ours", "tolerance", "verdict", "why",
-        "check", "where",
+        "check", "seen", "where",
     }  # fmt: skip
     shown = weighbridge("reproduce", "galvao", "--json", "-")
     assert json.loads(shown.out)["rows"] == found

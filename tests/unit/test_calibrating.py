@@ -13,6 +13,7 @@ from tests.noted import refused, says
 from weighbridge import CalibrationSettings, Vehicle, calibrate, weigh
 from weighbridge.balance import force_balance
 from weighbridge.calibration import self_weighing
+from weighbridge.calibration.printed import TrainingSettings
 from weighbridge.calibration.run import (
     run_calibration,
     run_speed_calibration,
@@ -174,13 +175,24 @@ def test_a_source_without_a_floor_has_the_range_of_its_readings(empty, monkeypat
     assert high < 1.05 * np.nanmax(reading)
 
 
-def test_grid_of_table_5_ends_near(empty, fitted):
-    car = fitted("rls").vehicle
-    grid = calibrate(empty.drive, settings=CalibrationSettings(grid=True, method="rls"))
-    assert grid.road_load.drag_area == pytest.approx(car.road_load.drag_area, abs=0.06)
-    # Values of Table 5 only.
-    steps = (grid.road_load.drag_area - 0.30) / 0.05
+@pytest.mark.parametrize("limits", [(0.30, 1.00, 0.05), (0.40, 0.50, 0.02)])
+def test_the_training_as_printed_ends_on_its_grid(empty, limits):
+    chosen = TrainingSettings(grid_drag_area=limits)
+    settings = CalibrationSettings(grid=True, method="rls", training=chosen)
+    found = calibrate(empty.drive, settings=settings)
+    low, high, step = limits
+    steps = (found.road_load.drag_area - low) / step
+    assert low - 1e-9 <= found.road_load.drag_area <= high + 1e-9
     assert steps == pytest.approx(round(steps), abs=1e-6)
+    assert found.provenance.masses == (empty.drive.info.mass,)
+
+
+def test_the_training_as_printed_is_on_one_drive(empty, loaded):
+    settings = CalibrationSettings(grid=True, method="rls")
+    with pytest.raises(ConfigError, match="is on one drive, got 2"):
+        calibrate([empty.drive, loaded.drive], settings=settings)
+    with pytest.raises(ConfigError, match="training is that of the grid"):
+        CalibrationSettings(method="rls", training=TrainingSettings(order=3))
 
 
 def test_what_lies_on_a_bound_is_told_with_what_it_means():

@@ -80,6 +80,16 @@ def test_a_difference_needs_a_reason_and_a_command():
         Item(item="fig. 1", where="docs", ours="{ratio}")
 
 
+def test_a_run_that_shows_the_reason_of_a_difference_names_the_command():
+    shown = Found(
+        "3 %", False, why="1 % with f = 0.01", check="weighbridge reproduce b --set f=0.01"
+    )
+    row = RULE.row("b", {"ratio": shown, "more": Found("1 %", True)})
+    assert (row.why, row.check, row.accounted) == (shown.why, shown.check, True)
+    agreeing = RULE.row("b", {"ratio": replace(shown, agrees=True), "more": Found("1 %", True)})
+    assert (agreeing.why, agreeing.check) == ("", "")
+
+
 def test_an_equation_agrees_to_rounding_alone():
     assert same([1.0, 2.0], [1.0, 2.0 + 1e-10]).agrees
     apart = same([1.0, 2.0], [1.0, 2.0 + 1e-7], "N")
@@ -110,6 +120,8 @@ def test_a_check_is_a_command_that_changes_something(paper):
         program, command, name, *options = check.split()
         assert (program, command, name) == ("weighbridge", "reproduce", paper)
         assert options[::2] == ["--set"] * (len(options) // 2)
+        rows = [i for i in items_of(paper) if i.check == check]
+        assert options or all(i.seen for i in rows if i.ours), check
         if options:
             assert differences(changed(settings_of(paper)(), parsed(options[1::2]))), check
 

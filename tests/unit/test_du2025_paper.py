@@ -9,7 +9,7 @@ from weighbridge.estimators.hybrid import Blend
 from weighbridge.estimators.settings import changed, parsed
 from weighbridge.papers import du2025
 from weighbridge.papers.du2025_claims import CLAIMS
-from weighbridge.papers.du2025_methods import BAND, FORMS, METHODS, PAPER_RMSE
+from weighbridge.papers.du2025_methods import BAND, FORMS, METHODS, PAPER_RMSE, READINGS
 from weighbridge.papers.du2025_told import swing, told
 from weighbridge.papers.reproduced import Reproduced
 
@@ -68,7 +68,7 @@ def test_with_every_row_and_a_low_threshold_a_constant_share_is_better_than_both
 
 
 def test_a_start_within_a_kilogram_keeps_the_mass_of_the_least_squares(judged):
-    assert judged.unit_start > 1.5 * judged.printed["e1"]["ekf"]
+    assert judged.unit_start["e1"] > 1.5 * judged.printed["e1"]["ekf"]
 
 
 def test_all_loads_brake_early_as_in_the_paper():
@@ -202,8 +202,17 @@ def test_tables_and_page_name_what_differs(judged, tmp_path, monkeypatch):
     assert name not in done.unaccounted
     rows = {(r.item, r.what): r for r in done.rows}
     # The printed rolling coefficient makes a bus heavy, and nothing passes over that.
-    heavy = rows["table 2", "RMSE, ekf half-load, rows left out, f = 0.0005"]
-    assert (heavy.verdict, heavy.accounted) == ("differs", True)
+    heavy = rows["table 2", "RMSE, robust-rls half-load"]
+    assert heavy.verdict == "differs"
+    # A difference is accounted for by a reading of print in which this run agrees, or not at all.
+    readings = {form.check: form.code for form in READINGS}
+    for row in done.rows:
+        if row.item == "table 2" and row.conditions == "as printed" and row.verdict == "differs":
+            assert row.accounted is bool(row.check)
+            if row.check:
+                method = row.what.split()[1].rstrip(",")
+                rmse = judged.printed[readings[row.check]][method]
+                assert rmse == pytest.approx(float(row.printed.split()[0]), rel=0.1)
     assert rows["table 2", "RMSE, ekf half-load, tyres' f known"].verdict == "agrees"
     # Nothing excuses ours where the bus is known.
     assert name in run(poor).unaccounted

@@ -9,6 +9,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from weighbridge.calibration.grid import TABLE_5
+from weighbridge.calibration.printed import pulling
 from weighbridge.errors import ConfigError
 from weighbridge.estimators.rls import RlsSettings, estimate, run_in_turn
 from weighbridge.papers import jensen2022, jensen2022_reproduction, seed_of, settings_of
@@ -23,7 +24,7 @@ from weighbridge.papers.jensen2022_drives import (
 )
 from weighbridge.papers.jensen2022_gradient import gradient_road, gradient_scenario
 from weighbridge.papers.jensen2022_judged import joined, torques
-from weighbridge.papers.jensen2022_printed import calibrate_as_printed, pulling
+from weighbridge.papers.jensen2022_printed import train
 from weighbridge.papers.jensen2022_tables import (
     WEIGHT_UNITS,
     parameters_table,
@@ -40,7 +41,7 @@ def made():
 
 @pytest.fixture(scope="module")
 def car(made):
-    return calibrate_as_printed(made.drive, float(made.truth.mass[0]))
+    return train(made.drive, float(made.truth.mass[0]))
 
 
 def test_the_conditions_of_a_drive_are_settings():

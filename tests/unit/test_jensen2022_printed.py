@@ -14,12 +14,13 @@ from weighbridge.estimators.rls import RlsSettings, parameters
 from weighbridge.kernels import ins_printed as kernel
 from weighbridge.kernels import rls
 from weighbridge.kernels.rotation import euler_to_quaternion
-from weighbridge.papers.jensen2022_filter import PrintedFilterSettings, level_mounting
+from weighbridge.navigation.printed import PrintedFilterSettings, level_mounting
 from weighbridge.papers.jensen2022_printed import (
     PrintedSettings,
-    calibrate_as_printed,
+    train,
     weigh_as_printed,
 )
+from weighbridge.pipeline.weighing import weigh
 from weighbridge.simulation import make_scenario, simulate_car
 
 
@@ -30,7 +31,7 @@ def made():
 
 @pytest.fixture(scope="module")
 def car(made):
-    return calibrate_as_printed(made.drive, float(made.truth.mass[0]))
+    return train(made.drive, float(made.truth.mass[0]))
 
 
 def skew(v):
@@ -143,6 +144,15 @@ def test_the_running_mass_is_that_of_equations_7_to_9(made, car):
     assert_allclose(track.running_mass[rows], expected, rtol=1e-9)
 
 
+def test_a_users_drive_is_weighed_as_printed(made, car):
+    printed = weigh_as_printed(made.drive, car, PrintedSettings(forgetting=0.998))
+    asked = {"printed": True, "forgetting": 0.998}
+    found = weigh(made.drive, car.vehicle, "rls", settings=asked)
+    assert found.mass == pytest.approx(printed.running_mass[-1], rel=1e-9)
+    coarse = weigh(made.drive, car.vehicle, "rls", settings={**asked, "filter.speed_std": 0.05})
+    assert abs(coarse.mass / found.mass - 1.0) > 1e-4
+
+
 @pytest.mark.parametrize("guarded", [False, True])
 def test_the_guard_keeps_the_gain_at_its_start_where_nothing_is_learnt(guarded):
     settings = RlsSettings(wind_up_guard=guarded, forgetting=0.99, gate=math.inf)
@@ -157,7 +167,7 @@ def test_the_guard_keeps_the_gain_at_its_start_where_nothing_is_learnt(guarded):
 
 
 def test_the_fit_is_on_the_grid_unless_it_is_told_not_to(made, car):
-    free = calibrate_as_printed(made.drive, 1578.0, PrintedSettings(grid=False)).vehicle
+    free = train(made.drive, 1578.0, PrintedSettings(grid=False)).vehicle
     assert np.min(np.abs(TABLE_5[1] - car.vehicle.road_load.rolling_coefficient)) < 1e-9
     assert np.min(np.abs(TABLE_5[1] - free.road_load.rolling_coefficient)) > 1e-4
 

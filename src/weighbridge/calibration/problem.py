@@ -63,7 +63,6 @@ class Problem:
     source: TorqueSource
     order: int
     curved: bool
-    grid: bool
 
     @property
     def masses(self) -> list[float]:
@@ -178,7 +177,6 @@ def problem_of(
         source=source,
         order=order,
         curved=settings.curved and modelled,
-        grid=settings.grid,
     )
 
 

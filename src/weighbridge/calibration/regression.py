@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -213,20 +213,6 @@ def driven_slope(fitted: TorqueFit, rows: TorqueRows, *, curved: bool) -> tuple[
         slope[-1] = 2.0 * float(np.average(source, weights=fitted.weight))
     cov = fitted.cov[: slope.size, : slope.size]
     return float(slope @ fitted.coefficients), float(np.sqrt(slope @ cov @ slope))
-
-
-def at_point(rows: TorqueRows, fitted: TorqueFit, coefficients: Floats, road: Floats) -> TorqueFit:
-    """Return a fit of the same rows and weights at other parameters, such as a grid's."""
-    residual = rows.target - rows.design @ np.concatenate([coefficients, road])
-    return replace(
-        fitted,
-        coefficients=coefficients,
-        road=road,
-        residual=residual,
-        r_squared=_r_squared(rows.target - rows.design[:, -4:] @ road, residual, fitted.weight),
-        residual_std=spread(residual),
-        at_bound=(),
-    )
 
 
 def _r_squared(torque: Floats, residual: Floats, weight: Floats) -> float:

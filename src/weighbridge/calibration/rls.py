@@ -19,20 +19,17 @@ from weighbridge.calibration.fitted import (
     ranges,
     rebalanced,
 )
-from weighbridge.calibration.grid import grid_search
 from weighbridge.calibration.problem import Problem
 from weighbridge.calibration.recording import DelayedRows
 from weighbridge.calibration.regression import (
     TorqueFit,
     TorqueRows,
-    at_point,
     build_rows,
     driven_slope,
     fit,
     join_rows,
 )
 from weighbridge.calibration.uncertain_motion import gain_std
-from weighbridge.errors import ConfigError
 from weighbridge.estimators.judging import cold_share
 from weighbridge.estimators.regression import regression
 from weighbridge.estimators.rls import block_jackknife
@@ -65,8 +62,6 @@ def fit_rls(problem: Problem) -> Fitted:
     joined = torque_rows_of(problem, rows)
     fitted = fit(joined, low, high)
     refuse_nonsense(problem, *driven_slope(fitted, joined, curved=problem.curved))
-    if problem.grid:
-        fitted = _on_grid(problem, joined, fitted)
     spread = delay_std(search.misfit, delay, fitted.independent_rows) if found else float("nan")
     speeds, loads = ranges(problem, rows)
     vehicle = replace(
@@ -163,16 +158,6 @@ def torque_rows_of(problem: Problem, rows: Sequence[DelayedRows]) -> TorqueRows:
             for recording, part in zip(problem.recordings, rows, strict=True)
         ]
     )
-
-
-def _on_grid(problem: Problem, rows: TorqueRows, fitted: TorqueFit) -> TorqueFit:
-    """Solve on the grid of Table 5."""
-    if not problem.base.of_class.jensen_grid or problem.draft.driveline.single_speed:
-        raise ConfigError(
-            "the grid of Jensen 2022 is for cars with gears; calibrate without --grid"
-        )
-    coefficients, road, _ = grid_search(rows, fitted.weight)
-    return at_point(rows, fitted, coefficients, road)
 
 
 def _bounds(base: Vehicle, driveline: Driveline) -> tuple[Floats, Floats]:

@@ -22,6 +22,7 @@ from weighbridge.calibration.known_mass import (
     scale_by_mass,
     scale_finding,
 )
+from weighbridge.calibration.printed import PrintedCar, calibrate_as_printed
 from weighbridge.calibration.problem import Problem, checked, problem_of
 from weighbridge.calibration.questionable_masses import (
     questionable_masses,
@@ -105,9 +106,33 @@ def calibrate(
         check_type("settings", settings, CalibrationSettings, "a weighbridge.CalibrationSettings")
     base = as_vehicle(vehicle) if vehicle is not None else None
     known = as_drives(drives, mapping_of(base, home_of(vehicle)), mapping)
+    if settings is not None and settings.grid:
+        return run_training(known, mass, vehicle=base, settings=settings).vehicle
     if settings is not None and not settings.fit.torque:
         return run_speed_calibration(known, mass, vehicle=base).vehicle
     return run_calibration(known, mass, vehicle=base, settings=settings).vehicle
+
+
+def run_training(
+    drives: Drive | Sequence[Drive],
+    mass: float | Sequence[float] | None = None,
+    *,
+    vehicle: Vehicle | None = None,
+    settings: CalibrationSettings,
+) -> PrintedCar:
+    """As `calibrate` with ``grid``, keeping what was fitted.
+
+    Raises
+    ------
+    ConfigError
+        There are several drives.
+    """
+    drives, base, masses = checked(drives, mass, vehicle, "load")
+    if len(drives) > 1:
+        raise ConfigError(
+            f"the training of Jensen 2022 is on one drive, got {len(drives)}: name one of them"
+        )
+    return calibrate_as_printed(drives[0], masses[0], base, settings.training)
 
 
 def run_speed_calibration(

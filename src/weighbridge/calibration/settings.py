@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from numbers import Integral
 
 from weighbridge.arguments import check_choice, check_flag, check_number, check_text, check_type
+from weighbridge.calibration.printed import TrainingSettings
 from weighbridge.errors import ConfigError
 from weighbridge.vehicle.fits import FITS, JOINT, RLS, Fit
 from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
@@ -20,7 +21,9 @@ class CalibrationSettings:
     order : highest power of engine speed in the torque regression; 2 for load
         and air flow, 0 for measured torque when None
     source : torque source; the best the drives have when None
-    grid : solve on the grid of Jensen 2022, Table 5, instead of within bounds
+    grid : train as Jensen 2022 prints it: its filter of the motion, no lateness, plain squares on
+        the grid of Table 5, on one drive
+    training : of that, such as the limits of the grid
     curved : let the torque per load change with engine speed and load; off for
         the regression of eq. 49 as printed
     method : estimator the vehicle is calibrated for: "joint", "rls" by eq. 48,
@@ -33,6 +36,7 @@ class CalibrationSettings:
     grid: bool = False
     curved: bool = True
     method: str = JOINT.name
+    training: TrainingSettings = field(default_factory=TrainingSettings)
 
     def __post_init__(self) -> None:
         if self.order is not None:
@@ -49,6 +53,12 @@ class CalibrationSettings:
         check_choice("method", self.method, FITS)
         if self.grid and self.fit != RLS:
             raise ConfigError("the grid of Jensen 2022 is of method rls; calibrate with that")
+        if self.grid and (self.order is not None or self.source not in (None, "load")):
+            raise ConfigError(
+                "the grid of Jensen 2022 is of source load, and training.order is its order"
+            )
+        if not self.grid and self.training != TrainingSettings():
+            raise ConfigError("training is that of the grid; calibrate with grid as well")
 
     @property
     def fit(self) -> Fit:

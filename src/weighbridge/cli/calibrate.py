@@ -99,7 +99,18 @@ _Torque = Annotated[
 _Grid = Annotated[
     bool,
     typer.Option(
-        "--grid", help="Search the parameter grid of Jensen 2022, Table 5, instead of a fit."
+        "--grid",
+        help="Train as Jensen 2022 prints it, with --method rls: its filter, and plain squares on "
+        "the grid of Table 5.",
+    ),
+]
+_Changes = Annotated[
+    Optional[list[str]],  # noqa: UP045
+    typer.Option(
+        "--set",
+        help="Change a setting of --grid, such as grid_wheels=1,20,1 (lower and upper limit, "
+        "step); repeat it for more.",
+        metavar="NAME=VALUE",
     ),
 ]
 _Straight = Annotated[
@@ -118,6 +129,7 @@ def calibrate(
     order: _Order = None,
     torque: _Torque = None,
     grid: _Grid = False,
+    changes: _Changes = None,
     straight: _Straight = False,
     whole: Whole = False,
     mapping: MappingPath = None,
@@ -132,8 +144,10 @@ def calibrate(
     Example: weighbridge calibrate drive-empty/ --mass 1580 -o car.toml
     """
     from weighbridge.arguments import check_choice
+    from weighbridge.calibration.printed import TrainingSettings
     from weighbridge.calibration.questionable_masses import with_findings
     from weighbridge.calibration.settings import CalibrationSettings
+    from weighbridge.estimators.settings import changed, parsed
     from weighbridge.pipeline.given import dbcs_beside, mapping_beside
     from weighbridge.vehicle.model import Vehicle
     from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
@@ -149,6 +163,7 @@ def calibrate(
         order=order,
         source=torque,
         grid=grid,
+        training=changed(TrainingSettings(), parsed(changes or [])),
         curved=not straight,
         method=method,
     )
@@ -172,7 +187,7 @@ def calibrate(
             read_with = tuple(dbcs_beside(dbc, output))
             car = replace(car, provenance=replace(car.provenance, dbc=read_with))
         own = None
-        if settings.fit.torque:
+        if settings.fit.torque and not settings.grid:
             bar.begin("weighing by it", len(recorded))
             own = own_masses(car, recorded, bar.within)
             notes += own.lines
@@ -198,8 +213,18 @@ def _fitted(
     tell: Callable[[int, int], None],
 ) -> tuple[Vehicle, Table, list[str]]:
     """Fit a vehicle; return it, what the terminal shows of it, and notes."""
-    from weighbridge.calibration.run import run_calibration, run_speed_calibration
+    from weighbridge.calibration.run import (
+        run_calibration,
+        run_speed_calibration,
+        run_training,
+    )
 
+    if settings.grid:
+        trained = run_training(recorded, masses, vehicle=base, settings=settings)
+        car = trained.vehicle
+        if tare is not None:
+            car = _with_tare(car, tare, car.provenance.masses[0])
+        return car, training_table(car), []
     if settings.fit.torque:
         done = run_calibration(recorded, masses, vehicle=base, settings=settings, progress=tell)
         if tare is not None:
@@ -303,6 +328,28 @@ def speed_table(done: SpeedCalibration) -> Table:
         "Torque in proportion to speed hardly shows the mass: weighing by speed alone gives back "
         "the mass of this calibration."
     )
+    return shown
+
+
+def training_table(car: Vehicle) -> Table:
+    """Show what the training of Jensen 2022 found."""
+    from rich.table import Table
+
+    from weighbridge.balance.law import ROAD_PARAMETERS
+
+    shown = Table(title=f"training of {_shown(car.name)} as Jensen 2022", **_LEFT)
+    shown.add_column("parameter")
+    shown.add_column("value", justify="right")
+    shown.add_row("gearings (1/m)", ", ".join(f"{g:.1f}" for g in car.driveline.gearings))
+    road = (
+        car.road_load.drag_area, car.road_load.rolling_coefficient,
+        car.driveline.engine_inertia, car.driveline.wheel_inertia,
+    )  # fmt: skip
+    for name, value in zip(ROAD_PARAMETERS, road, strict=True):
+        shown.add_row(name, f"{value:.4g}")
+    for k, weight in enumerate(car.torque.coefficients):
+        shown.add_row(f"w{k} of eq. 49", f"{weight:.4g}")
+    shown.add_row("R² of the torque", f"{car.provenance.r_squared:.3f}")
     return shown
 
 

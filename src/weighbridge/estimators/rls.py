@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 import numpy as np
@@ -18,6 +19,7 @@ from weighbridge.estimators.judging import consider_std, converged_at, segments
 from weighbridge.estimators.regression import regression
 from weighbridge.estimators.track import MassTrack
 from weighbridge.kernels import rls as kernel
+from weighbridge.navigation.printed import PrintedFilterSettings
 from weighbridge.signals import Bools, Floats, Ints
 from weighbridge.signals.robust import spread
 from weighbridge.vehicle.model import Vehicle
@@ -46,6 +48,9 @@ class RlsSettings(GateSettings):
         has no such guard
     every_row : every row with rising speed and a gear, as the paper has it: those of shifts,
         curves, a slipping clutch and a dragged engine too
+    printed : as the paper: the motion by its own filter, no lateness of the torque, every row, no
+        gate, no guard; the mass is that of the filter at the end of the drive
+    filter : of the motion with ``printed``
     """
 
     forgetting: float = 0.9995
@@ -55,6 +60,8 @@ class RlsSettings(GateSettings):
     settle_rows: int = 200
     wind_up_guard: bool = True
     every_row: bool = False
+    printed: bool = False
+    filter: PrintedFilterSettings = field(default_factory=PrintedFilterSettings)
 
     def __post_init__(self) -> None:
         GateSettings.__post_init__(self)
@@ -64,6 +71,13 @@ class RlsSettings(GateSettings):
             raise ConfigError(f"initial_gain must be positive, got {self.initial_gain}")
         if not self.gate > 0.0:
             raise ConfigError(f"gate must be positive, got {self.gate}")
+
+    @property
+    def effective(self) -> RlsSettings:
+        """The same with what ``printed`` means."""
+        if not self.printed:
+            return self
+        return replace(self, gate=math.inf, wind_up_guard=False, every_row=True)
 
 
 _LEFT_OUT_SINCE: Final = (
@@ -82,6 +96,7 @@ PAPER_RATE: Final = 4.0
 
 def parameters(settings: RlsSettings, period: float) -> kernel.RlsParams:
     """Make the kernel's parameters for rows ``period`` apart [s]."""
+    settings = settings.effective
     forgetting = settings.forgetting ** (PAPER_RATE * period)
     return kernel.RlsParams(
         forgetting=forgetting,
@@ -101,7 +116,8 @@ def estimate(
     The running mass is the paper's filter. The final answer is the least
     squares of all the rows it took, for the mass of a drive does not change
     unnoticed; its standard deviation comes from leaving out one minute-long
-    block at a time, so that slow errors count as what they are.
+    block at a time, so that slow errors count as what they are. With ``printed``
+    the answer is the paper's filter at the end.
 
     Parameters
     ----------
@@ -113,7 +129,7 @@ def estimate(
     Jensen et al. 2022, eqs. 4-9. Quenouille's jackknife over blocks: Künsch,
     Annals of Statistics 17, 1989.
     """
-    settings = settings or RlsSettings()
+    settings = (settings or RlsSettings()).effective
     table = balance.table
     phi, y, row_reason = _rows(balance, vehicle, settings)
     valid = row_reason == 0
@@ -124,6 +140,10 @@ def estimate(
     used = row_reason == Reason.USED
 
     mass, spread, blocks = block_jackknife(table.time, phi, y, used)
+    # Before the first row there is a start value, but no measurement.
+    running = np.where(np.cumsum(used) > 0, theta[:, 0], np.nan)
+    if settings.printed and used.any():
+        mass = float(running[-1])
     slow = consider_std(balance, phi, used, vehicle)
     fitted = Fitted(
         mass=mass,
@@ -134,8 +154,6 @@ def estimate(
     )
     found = judged(balance, vehicle, used, phi, fitted, slow, NOISE_SHARE, settings)
     residual = np.where(used, y - phi * mass, np.nan)
-    # Before the first row there is a start value, but no measurement.
-    running = np.where(np.cumsum(used) > 0, theta[:, 0], np.nan)
 
     def part(rows: slice) -> tuple[float, float]:
         return block_jackknife(table.time[rows], phi[rows], y[rows], used[rows], 20.0)[:2]
@@ -178,7 +196,7 @@ def run_in_turn(
     ----------
     Jensen et al. 2022, fig. 13.
     """
-    settings = settings or RlsSettings()
+    settings = (settings or RlsSettings()).effective
     state, end, found = _start(settings), 0.0, []
     for balance in balances:
         table = balance.table

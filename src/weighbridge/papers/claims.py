@@ -51,11 +51,15 @@ class Found:
     text : as it is written beside the printed one
     agrees : with the printed one, within the tolerance of its item
     printed : the printed one, where it is computed, as that of an equation is
+    why, check : of a difference, where the run itself shows the reason: under what other settings
+        it agrees, and the command with them
     """
 
     text: str
     agrees: bool
     printed: str = ""
+    why: str = ""
+    check: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,6 +78,7 @@ class Item:
     why : what departs from print; of a figure that differs the reason, of an item without
         ``ours`` why it is not reproducible
     check : command by which a reader sees the reason of a difference
+    seen : row or table of that command's output that shows it; empty where this row agrees there
     """
 
     item: str
@@ -85,6 +90,7 @@ class Item:
     tolerance: str = ""
     why: str = ""
     check: str = ""
+    seen: str = ""
 
     def __post_init__(self) -> None:
         if not self.ours and not self.why:
@@ -112,8 +118,9 @@ class Item:
             ours=self.ours.format_map({n: figures[n].text for n in self.names}),
             tolerance=self.tolerance,
             verdict=verdict,
-            why=self.why,
-            check=self.check,
+            why=listed(self.why, *(f.why for f in asked if not f.agrees)),
+            check=next((f.check for f in asked if f.check and not f.agrees), self.check),
+            seen=self.seen,
             where=self.where,
         )
 
@@ -132,6 +139,7 @@ class Row:
     verdict: Verdict
     why: str
     check: str
+    seen: str
     where: str
 
     @property
@@ -160,7 +168,8 @@ class Row:
     @property
     def reasons(self) -> tuple[str, ...]:
         """Each reason and the command that shows it, as often repeated in other rows."""
-        return (*self.why.split("; "), *([f"`{self.check}`"] if self.check else ()))
+        seen = f": {self.seen}" if self.seen else ""
+        return (*self.why.split("; "), *([f"`{self.check}`{seen}"] if self.check else ()))
 
     def record(self) -> dict[str, Any]:
         """Return the row as JSON has it."""

@@ -10,7 +10,7 @@ from typing import Final, TypeVar
 
 from weighbridge.balance import ForceBalance
 from weighbridge.estimators import MassTrack, ekf, hybrid, robust_rls
-from weighbridge.papers.claims import listed
+from weighbridge.estimators.settings import changed, parsed
 from weighbridge.report.style import BLUE, GREEN, ORANGE
 from weighbridge.vehicle.model import Vehicle
 
@@ -63,65 +63,82 @@ typically the identity, Huber's c and the information at which the first mass is
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Form:
-    """One reading of what the paper leaves open: rows, and the rolling coefficient.
+    """One reading of what the paper leaves open: rows, rolling coefficient, threshold, blend.
 
     Attributes
     ----------
     code : name of its figures
-    name : for people
-    rolling : coefficient that the filters are given; that of the vehicle file when None [-]
+    rolling : coefficient that the filters are given [-]
     every_row : braking, shifts and slip are left to Huber's weight; else rows with a reason
         against them are left out, and speeds of 5 standard deviations too
-    why, check : reason of a difference, and the command that shows it
+    threshold : Huber's, in standard deviations [-]; that of the settings when None
+    share : constant share of the least squares in the blend [-]; h(v) when None
     """
 
     code: str
-    name: str
-    rolling: float | None
+    rolling: float
     every_row: bool
-    why: str
-    check: str
+    threshold: float | None = None
+    share: float | None = None
+
+    @property
+    def name(self) -> str:
+        """For people."""
+        return ", ".join(
+            (
+                "every row" if self.every_row else "rows left out",
+                f"f = {self.rolling:g}",
+                *(() if self.threshold is None else (f"Huber's threshold {self.threshold:g}",)),
+                *(() if self.share is None else (f"a constant share of {self.share:g}",)),
+            )
+        )
+
+    @property
+    def changes(self) -> tuple[str, ...]:
+        """What it changes of the printed settings, as a command has it."""
+        start = "printed.ekf.start"
+        return (
+            *(() if self.every_row else (f"{start}.every_row=false", "printed.ekf.gate=5")),
+            f"{start}.rolling_coefficient={self.rolling:g}",
+            *(() if self.threshold is None else (f"{start}.threshold={self.threshold:g}",)),
+            *(
+                ()
+                if self.share is None
+                else ("printed.blend=share", f"printed.blend_share={self.share:g}")
+            ),
+        )
+
+    @property
+    def check(self) -> str:
+        """Command whose rows are by this reading."""
+        return " --set ".join(("weighbridge reproduce du2025", *self.changes))
 
     def of(self, settings: hybrid.HybridSettings) -> hybrid.HybridSettings:
-        """Return the printed settings in this reading."""
-        start = replace(
-            settings.ekf.start, rolling_coefficient=self.rolling, every_row=self.every_row
-        )
-        gate = math.inf if self.every_row else 5.0
-        return replace(settings, ekf=replace(settings.ekf, start=start, gate=gate))
+        """Return the printed settings in this reading; the first is the settings themselves."""
+        if self is FORMS[0]:
+            return settings
+        named = (change.removeprefix("printed.") for change in self.changes)
+        chosen: hybrid.HybridSettings = changed(settings, parsed(tuple(named)))
+        return chosen
 
-
-_COMMAND: Final = "weighbridge reproduce du2025"
-_BRAKED: Final = "brakings are rows without the brake's force, and Huber's threshold lets them in"
-_CALMER: Final = f"{_COMMAND} --set printed.ekf.start.threshold=0.5"
-_ROWS: Final = {
-    True: ("e", "every row", _BRAKED, _CALMER),
-    False: (
-        "l", "rows left out", "braking, shifts and slip are left out, which the paper does not "
-        "say", f"{_COMMAND} --set as_printed=true",
-    ),
-}  # fmt: skip
-_ROLLING: Final = {
-    "1": (0.0005, "f = 0.0005", "tyres have 0.0075 here, and each 0.001 less is 1.6 % of mass",
-          f"{_COMMAND} --set as_printed=true --set rolling_coefficient=0.0075"),
-    "10": (0.005, "f = 0.005", "tyres have 0.0075 here, and each 0.001 less is 1.6 % of mass",
-           f"{_COMMAND} --set as_printed=true --set rolling_coefficient=0.0075"),
-    "t": (None, "f of the tyres", "f is exact here, unlike in the paper", ""),
-}  # fmt: skip
 
 FORMS: Final = tuple(
-    Form(
-        code=f"{rows}{code}",
-        name=f"{words}, {name}",
-        rolling=rolling,
-        every_row=every,
-        why=listed(f_why, why),
-        check=check if every else f_check or check,
-    )
-    for every, (rows, words, why, check) in _ROWS.items()
-    for code, (rolling, name, f_why, f_check) in _ROLLING.items()
+    Form(code=f"{rows}{code}", rolling=rolling, every_row=rows == "e")
+    for rows in "el"
+    for code, rolling in (("1", 0.0005), ("10", 0.005), ("t", 0.0075))
 )
-"""As printed first: every row, f = 0.0005."""
+"""As printed first: every row, f = 0.0005. The simulated tyres have 0.0075, as buses do."""
+
+READINGS: Final = (
+    *FORMS,
+    Form(code="e8", rolling=0.004, every_row=True),
+    *(
+        Form(code=f"l{rolling}", rolling=rolling, every_row=False)
+        for rolling in (0.0053, 0.0057, 0.0066, 0.0072)
+    ),
+    Form(code="blend", rolling=0.003, every_row=True, threshold=0.5, share=0.05),
+)
+"""Those in which a printed figure is looked for that is not found as printed."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

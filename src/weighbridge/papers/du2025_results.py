@@ -54,8 +54,8 @@ class DriveResult:
     printed_worst : largest relative error of the running mass of the same from `CONVERGED` [-]
     printed_told : what the running mass of the same does, method by method
     printed_tracks : their tracks with f = 0.005, by the code of the form
-    unit_start : ``printed`` of the Kalman filter, first form, with a first variance of the mass
-        of 1 kg², P0 = I [kg]
+    unit_start : ``printed`` of the Kalman filter with a first variance of the mass of 1 kg²,
+        P0 = I [kg]
     opposite : errors of opposite sign, `Opposite`; None where the bus is not known
     """
 
@@ -76,7 +76,7 @@ class DriveResult:
     printed_worst: dict[str, dict[str, float]] = field(default_factory=dict)
     printed_told: dict[str, dict[str, Told]] = field(default_factory=dict)
     printed_tracks: dict[str, dict[str, MassTrack]] = field(default_factory=dict)
-    unit_start: float = float("nan")
+    unit_start: dict[str, float] = field(default_factory=dict)
     opposite: Opposite | None = None
 
 

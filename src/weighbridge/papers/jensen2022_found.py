@@ -12,10 +12,10 @@ from scipy.stats import gaussian_kde
 
 from weighbridge.calibration.grid import TABLE_5
 from weighbridge.estimators.rls import RlsSettings, run_in_turn
+from weighbridge.navigation.printed import PrintedFilterSettings
 from weighbridge.papers.claims import Found, same
 from weighbridge.papers.jensen2022_drives import TABLE_B1
 from weighbridge.papers.jensen2022_equations import equations
-from weighbridge.papers.jensen2022_filter import PrintedFilterSettings
 from weighbridge.papers.jensen2022_gradient import gradient_figures
 from weighbridge.papers.jensen2022_judged import BAND, ONE_DEGREE, DriveResult, joined, within
 from weighbridge.papers.jensen2022_printed import TYRE_RADIUS, PrintedSettings
@@ -162,9 +162,9 @@ def road(values: tuple[float, float, float, float]) -> str:
 
 
 def _wheels(car: Vehicle) -> Found:
-    """I_w alone: within a step of the true one."""
+    """I_w alone: within two steps of the true one."""
     value, true = fitted(car)[3], truth()[3]
-    return Found(f"{value:.1f} kg m²; truly {true:.1f}", abs(value - true) <= 1.0)
+    return Found(f"{value:.1f} kg m²; truly {true:.1f}", abs(value - true) <= 2.0)
 
 
 def _sample(done: Reproduction) -> dict[str, Found]:

@@ -9,12 +9,13 @@ from typing import Final
 
 import numpy as np
 
+from weighbridge.calibration.printed import PrintedCar
 from weighbridge.navigation.motion import Motion
+from weighbridge.navigation.printed import printed_motion
 from weighbridge.navigation.select import find_motion
 from weighbridge.papers.claims import Found
 from weighbridge.papers.jensen2022_drives import CONDITIONS, Conditions, without_weather
-from weighbridge.papers.jensen2022_filter import printed_motion
-from weighbridge.papers.jensen2022_printed import PrintedCar, PrintedSettings
+from weighbridge.papers.jensen2022_printed import PrintedSettings
 from weighbridge.report.style import BLUE, GREEN, GREY, VERMILLION, Panel, blank, line
 from weighbridge.signals import Floats
 from weighbridge.signals.units import from_si, scalar_from_si, scalar_to_si

@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 
 from weighbridge.balance import ForceBalance
+from weighbridge.calibration.printed import PrintedCar, pulling
 from weighbridge.calibration.run import run_calibration
 from weighbridge.calibration.settings import CalibrationSettings
 from weighbridge.errors import ConfigError
@@ -31,10 +32,8 @@ from weighbridge.papers.jensen2022_judged import (
     torques,
 )
 from weighbridge.papers.jensen2022_printed import (
-    PrintedCar,
     PrintedSettings,
-    calibrate_as_printed,
-    pulling,
+    train,
     weigh_as_printed,
 )
 from weighbridge.papers.reproduced import Progress
@@ -125,7 +124,8 @@ class Reproduction:
     calibration : ours, from the separate drive
     car : that of ``calibration``, with a tare
     printed_car : by the paper's rules, from the same drive
-    control : by the paper's rules, from the same drive with nothing but eq. 1 acting on the car
+    control : by the paper's rules, from the same drive with nothing but eq. 1 acting on the car,
+        rows of shifts left out
     ratio_errors, printed_ratio_errors : (7,) relative, of the gearings [-]
     drives : the 18 drives by our ``rls``, the wind unknown as in the paper
     printed : the same drives by the paper's rules, the wind unknown
@@ -186,10 +186,12 @@ def reproduce(
     unaware = without_weather(known.drive)
     calibration = run_calibration(unaware, mass, settings=fit)
     car = replace(calibration.vehicle, name="Audi A4 2.0 (simulated)", tare=MIDSIZE.mass)
-    cars = _Cars(car, calibrate_as_printed(unaware, mass, settings.printed))
+    cars = _Cars(car, train(unaware, mass, settings.printed))
     ideal = simulate_car(Conditions(ideal=True).of(usual))
-    control = calibrate_as_printed(
-        without_weather(ideal.drive), float(np.mean(ideal.truth.mass)), settings.printed
+    control = train(
+        without_weather(ideal.drive),
+        float(np.mean(ideal.truth.mass)),
+        replace(settings.printed, shifts=False),
     )
     if progress:
         progress(1, total)

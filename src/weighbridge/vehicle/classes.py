@@ -71,7 +71,6 @@ class VehicleClass:
     retarded : a retarder or an engine brake may slow it without the brake pedal
     unanswered : part of the scatter between force and a motion without accelerometer that is noise
         of the motion [-]: short of power, it slows down on a hill that its heights smooth away
-    jensen_grid : whether the grid of Jensen 2022, Table 5, is for it
     motor_helps : a motor drives it beside an engine, so that no torque of the engine shows all
     """
 
@@ -100,7 +99,6 @@ class VehicleClass:
     boarding_std: float = 0.0
     retarded: bool = False
     unanswered: float = 0.0
-    jensen_grid: bool = False
     motor_helps: bool = False
 
     def road_prior(self, *, single_speed: bool) -> tuple[Floats, Floats]:
@@ -160,7 +158,6 @@ CAR: Final = VehicleClass(
     squat_growth=0.0,
     fastest=FASTEST,
     strongest=STRONGEST,
-    jensen_grid=True,
 )
 """A car with an engine or a motor alone."""
 

@@ -1,7 +1,7 @@
 """Motion by the navigation filter of Jensen et al. 2022 as printed (sec. 5, 7.1).
 
-One pass forward, the paper's noise, no lean of the body, no lateness: what `rls` weighs by in the
-comparison with print. Drives are weighed by `weighbridge.navigation.select.find_motion`.
+One pass forward, the paper's noise, no lean of the body, no lateness: what `rls` weighs by with
+``printed=true``. Other drives are weighed by `weighbridge.navigation.select.find_motion`.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from weighbridge.kernels.rotation import euler_to_matrix, euler_to_quaternion
 from weighbridge.navigation.aiding import Fixes, Imu, read_fixes, read_imu
 from weighbridge.navigation.motion import Motion, noise_level
 from weighbridge.signals import Drive, Floats, Signal
+from weighbridge.vehicle.driveline import Mounting
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -111,6 +112,15 @@ class PrintedFilterSettings:
 
 _STRIDE = 10
 """Inertial samples per row of the motion: 20 Hz of the paper's 200 Hz."""
+
+
+def mounting_of(
+    drive: Drive, known: Mounting | None, settings: PrintedFilterSettings | None = None
+) -> Floats:
+    """Sensor to vehicle axes (3, 3): those of a vehicle file, else of `level_mounting`."""
+    if known is None:
+        return level_mounting(drive, settings)
+    return np.asarray(euler_to_matrix(known.roll, known.pitch, known.yaw))
 
 
 def level_mounting(drive: Drive, settings: PrintedFilterSettings | None = None) -> Floats:
