@@ -81,7 +81,7 @@ def test_parts_are_gathered_while_a_run_goes_on(tiny, scheduler, tmp_path, whole
     from weighbridge.fleet import run
 
     monkeypatch.setattr(run, "_GATHER", 3)
-    monkeypatch.setattr(run, "_TOLD", 0.0)
+    monkeypatch.setattr(run, "_REPORTED", 0.0)
     gathered = []
     real = Results.gather
     monkeypatch.setattr(Results, "gather", lambda self: gathered.append(real(self)))

@@ -46,6 +46,7 @@ class CalibrationSettings:
         check_flag("grid", self.grid)
         check_flag("curved", self.curved)
         check_text("method", self.method)
+        check_type("training", self.training, TrainingSettings, "TrainingSettings")
         if self.order is not None and not 0 <= self.order <= 4:
             raise ConfigError(f"order must be between 0 and 4, got {self.order}")
         if self.source is not None:
