@@ -26,7 +26,7 @@ FAST: Final = 2.9
 
 EXPECTED: Final[dict[tuple[MotionSource, bool], tuple[float, float, str]]] = {
     ("inertial", True): (0.4, 3.0, "what the torque's reading is worth, squat and wind"),
-    ("inertial", False): (1.0, 2.0, "how late slow readings are"),
+    ("inertial", False): (1.0, 3.0, "how late slow readings are"),
     ("longitudinal_accel", True): (1.5, 3.5, "the lean of the accelerometer, the torque's scale"),
     ("longitudinal_accel", False): (2.0, 4.0, "how late slow readings are, the sensor's lean"),
     ("speed_grade", True): (2.0, 6.0, "acceleration and grade come from smoothed speed and height"),
