@@ -798,7 +798,7 @@ def test_what_to_expect_follows_the_rate_of_the_torque():
         inspect_drive(drive.with_signals(*signals), CAR).ways[0].accuracy
         for signals in ((fast, speed), slow)
     ]
-    assert best == ["0.5–3.3 %", "1–2.4 %"]
+    assert best == ["0.5–3.3 %", "1–3.3 %"]
 
 
 def every_fourth(signal):
