@@ -14,7 +14,7 @@ FINE: Final = 0.025
 """Steps of a reading over its range that do no harm [-]: control units send 0.4 and 1 %."""
 
 LEAST: Final = 0.01
-"""What is not estimated below is not reported [-]."""
+"""Uncertainty below this is not reported [-]."""
 
 ROUNDING: Final = 1.0 / math.sqrt(12.0)
 """Standard deviation of an even error over its step [-]."""

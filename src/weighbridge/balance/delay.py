@@ -153,7 +153,7 @@ def delay_std(misfit: Callable[[float], float], delay: float, rows: float) -> fl
 def estimate_torque_delay(
     drive: Drive, vehicle: Vehicle, motion: Motion, begun: ForceBalance | None = None
 ) -> float:
-    """Find the delay at which traction explains specific force best [s]; NaN if unreported.
+    """Find the delay at which traction explains specific force best [s]; NaN where none stands out.
 
     A forward fit and an inverse one differ, but their product, the
     correlation, depends on the delay alone.
@@ -178,7 +178,7 @@ def clock_shift(
     known: float,
     begun: ForceBalance | None = None,
 ) -> float:
-    """Find by how much the torque is later than ``known`` [s]; 0 where it is not, or unreported.
+    """Find by how much the torque is later than ``known`` [s]; 0 where it is not, or none is seen.
 
     Less than `SAME_CLOCK` is no other clock. As much as 0.8 s is believed where it leaves half of
     the misfit or less, little where the misfit is lower there on both sides.

@@ -307,7 +307,7 @@ def _lonely() -> Callable[[Count], None]:
 
 @contextmanager
 def _progress() -> Iterator[Callable[[Count], None]]:
-    """Show a bar with rate and time left on a terminal; in a pipe, what must be reported alone."""
+    """Show a bar with rate and time left on a terminal; in a pipe, only what must be reported."""
     lonely = _lonely()
     if not watched():
         yield lonely

@@ -120,7 +120,7 @@ def check_signals(drive: Drive) -> Iterator[Problem]:
     for names in kinds.values():
         frozen = {name: _longest_still(drive, name) for name in names}
         if min(frozen.values()) > FROZEN:
-            # The vehicle stands, or, reported above, all of a kind are dead.
+            # The vehicle stands, or all of a kind are dead, which is reported above.
             continue
         for name, length in frozen.items():
             share = length / max(drive.signals[name].duration, 1e-9)

@@ -24,7 +24,7 @@ from weighbridge.signals import Bools, Floats, Problem
 DbcSource = str | Path
 """A DBC file, for one bus alone where it is written ``1:file.dbc``."""
 
-# Where a signal lies, and how long a message is. The library makes room for every bit reported.
+# Where a signal lies, and how long a message is. The library makes room for every bit it is given.
 _PLACES: Final = re.compile(r":\s*(\d+)\s*\|\s*(\d+)\s*@")
 _SIZES: Final = re.compile(r"\bBO_\s+\d+\s+\w+\s*:\s*(\d+)")
 

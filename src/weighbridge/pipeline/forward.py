@@ -299,7 +299,7 @@ def step(
 def looked_ahead(
     state: ForwardState, records: Drive, newest: float, setup: ForwardSetup
 ) -> ForwardState:
-    """Return a copy of a state with all that came since, as far as it can be reported already.
+    """Return a copy of a state with all that came since, as far as it is known already.
 
     It is to look at, never to go on from: samples may be missing that still come, rows have
     `HURRY` less to look ahead, and the open window counts as `with_open` says.

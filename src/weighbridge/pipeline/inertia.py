@@ -76,7 +76,7 @@ STATIC_PART: Final = 0.04
 """Weight at rest and mass in motion may differ by this part of the mass [-]."""
 
 HOPPING: Final = 0.0075
-"""A ride sampled more slowly is reported that faster is better [s]: at 100 Hz the axles' hop is
+"""A ride sampled more slowly gets the note that faster is better [s]: at 100 Hz the axles' hop is
 integrated to within 0.5 %, at 200 Hz to within 0.03 %."""
 
 TILT: Final = 0.003
