@@ -213,7 +213,7 @@ def test_a_noisy_accelerometer_is_not_taken_for_a_smoothed_torque(fleet):
     def noise(span):
         return std**2 * period / span
 
-    assert smoothed_torque(noisy, vehicle).id == "torque.smoothed"
+    assert smoothed_torque(noisy, vehicle).id == "imu.noise"
     assert smoothed_torque(noisy, vehicle, noise=noise) is None
 
 

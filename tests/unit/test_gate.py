@@ -19,7 +19,7 @@ from weighbridge.simulation import MIDSIZE, Scenario, short_route, simulate_car
 from weighbridge.vehicle.model import Driveline, Provenance, RoadLoad, TorqueModel, Vehicle
 
 METHODS = ("joint", "rls", "robust-rls", "ekf", "hybrid")
-ANY_WIDTH = {"widest": np.inf, "widest_of_drive": np.inf}
+ANY_WIDTH = {"widest": np.inf}
 MASS = 10_000.0
 BUS = Vehicle(
     kind="bus",
@@ -152,13 +152,12 @@ def test_a_mass_above_what_loads_explain_is_none(method):
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_what_the_drive_leaves_open_is_bounded_whatever_the_file_does(method):
+def test_what_the_file_leaves_open_counts_for_the_width(method):
     wide = replace(BUS, provenance=Provenance(mass_scale_std=0.12))
     assert ESTIMATORS[method].track(balance(), wide).status is Status.CONVERGED
-    for bound in ({"widest_of_drive": 1e-3}, {"widest": 0.1}):
-        track = weighed(method, balance(), wide, **bound)
-        assert track.status is Status.NOT_EXCITED
-        assert track.reason.id == "motion.wide"
+    track = weighed(method, balance(), wide, widest=0.1)
+    assert track.status is Status.NOT_EXCITED
+    assert track.reason.id == "motion.wide"
 
 
 @pytest.mark.parametrize("method", METHODS)

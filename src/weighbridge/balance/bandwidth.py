@@ -61,7 +61,8 @@ def smoothed_torque(
     Means of the rows before and after an instant are compared, over a short and a long time: what
     the force changes by for each change of the specific force is the mass, over both. A torque that
     was filtered lacks the quick changes. Noise of the motion lowers the mass over the short time
-    too, and is allowed for as far as it is known.
+    too, and is allowed for as far as it is known. What is not known of it, the speed shows: it has
+    no part in the noise of the accelerometer.
 
     Parameters
     ----------
@@ -69,10 +70,14 @@ def smoothed_torque(
     beside : (n,) force that is known to be accessories' [N]
     noise : variance of the mean specific force over a time [s] [m^2/s^4]
 
+    Returns
+    -------
+    ``torque.smoothed``, or ``imu.noise`` where it is the accelerometer
+
     References
     ----------
-    Regression with errors of known variance in the regressor: Fuller, Measurement Error Models,
-    1987, ch. 1.
+    Regression with errors of known variance in the regressor, and with a third variable as
+    instrument: Fuller, Measurement Error Models, 1987, ch. 1.2, 1.4.
     """
     table = balance.table
     if balance.motion.source != "inertial" or table.time.size < FEWEST_ROWS:
@@ -81,46 +86,60 @@ def smoothed_torque(
         return None
     force = force_on_mass(table, vehicle) - beside
     use = table.usable & np.isfinite(force) & np.isfinite(table.specific_force)
+    signals = table.time, use, force, table.specific_force
     slow = None
     for span in SLOW:
-        slow = slow or _slopes(table.time, use, force, table.specific_force, span, noise(span))
+        slow = slow or _slopes(*signals, span, noise(span))
     if slow is None:
         return None
     for span in FAST:
-        fast = _slopes(table.time, use, force, table.specific_force, span, noise(span))
-        if fast is not None and (said := _lacking(fast, slow, span, vehicle)):
-            return said
+        fast = _slopes(*signals, span, noise(span))
+        if fast is None or not _lacking(fast, slow):
+            continue
+        quick, lasting = (float(force.sum() / motion.sum()) for force, motion in (fast, slow))
+        values = {"within": 2.0 * span, "quick": max(quick, 0.0), "slow": lasting}
+        by_speed = _slopes(*signals, span, noise(span), balance.wheel_speed)
+        if by_speed is not None and _there(by_speed, slow):
+            return Problem.of("imu.noise", **values)
+        return Problem.of("torque.smoothed", **values, source=vehicle.torque.of_source.name)
     return None
 
 
-def _lacking(
-    fast: tuple[Floats, Floats], slow: tuple[Floats, Floats], span: float, vehicle: Vehicle
-) -> Problem | None:
-    """Say that changes of force over ``span`` [s] are less than slow ones show; None if not."""
+def _lacking(fast: tuple[Floats, Floats], slow: tuple[Floats, Floats]) -> bool:
+    """Whether quick changes of force are less than slow ones show."""
     if min(np.count_nonzero(fast[1]), np.count_nonzero(slow[1])) < FEWEST_BLOCKS:
-        return None
+        return False
     ratio, std = _ratio(fast, slow)
-    if not ratio + SURE * std < SMOOTHED:
-        return None
-    quick, lasting = float(fast[0].sum() / fast[1].sum()), float(slow[0].sum() / slow[1].sum())
-    name = vehicle.torque.of_source.name
-    return Problem.of(
-        "torque.smoothed", within=2.0 * span, quick=max(quick, 0.0), slow=lasting, source=name
-    )
+    return ratio + SURE * std < SMOOTHED
+
+
+def _there(fast: tuple[Floats, Floats], slow: tuple[Floats, Floats]) -> bool:
+    """Whether quick changes of force are there."""
+    ratio, std = _ratio(fast, slow)
+    return ratio - std > SMOOTHED
 
 
 def _slopes(
-    time: Floats, use: Bools, force: Floats, specific: Floats, span: float, noise: float
+    time: Floats,
+    use: Bools,
+    force: Floats,
+    specific: Floats,
+    span: float,
+    noise: float,
+    speed: Floats | None = None,
 ) -> tuple[Floats, Floats] | None:
     """Sums over blocks of force times acceleration, and of acceleration squared.
 
     Both are changes of the mean over ``span`` from before an instant to after it; ``noise`` is the
-    variance of such a mean, of which two are in each change.
+    variance of such a mean, of which two are in each change. With ``speed`` (n,), both are
+    multiplied by its acceleration instead.
 
     Returns
     -------
     common, square : (k,); None where they show nothing
     """
+    if speed is not None:
+        use = use & np.isfinite(speed)
     before, after = np.searchsorted(time, time - span), np.searchsorted(time, time + span)
     here = np.arange(time.size)
     count = np.concatenate(([0], np.cumsum(use)))
@@ -143,6 +162,11 @@ def _slopes(
     least = FOLLOWS * np.sqrt(float(by_motion @ by_motion) * float(by_force @ by_force))
     if common.sum() < least and span > max(FAST):
         return None
+    if speed is not None:
+        # The mean acceleration is the difference of its ends.
+        v, t = ([x[k[whole]] for k in (before, here, after - 1)] for x in (speed, time))
+        accel = (v[2] - v[1]) / (t[2] - t[1]) - (v[1] - v[0]) / (t[1] - t[0])
+        common, square = by_force * accel, by_motion * accel
     block = ((time[whole] - time[0]) / BLOCK).astype(np.int64)
     return np.bincount(block, common).astype(float), np.bincount(block, square).astype(float)
 

@@ -169,13 +169,17 @@ def _likeliest(problem: Problem) -> tuple[Fitted, Floats]:
     if any(beside):
         found = fit_with_gusts(_without(given, beside, first), settings)
         _refuse_strange(problem, found, rows, settings)
+    powers = [one.power for one in beside if one is not None]
     vehicle = _with(problem.draft, found, settings)
     speeds, loads = ranges(problem, rows)
     vehicle = replace(
         vehicle,
         torque=replace(vehicle.torque, noise=noise, load_range=loads, speed_range=speeds),
         timing=replace(timing, torque_delay_std=search.std),
-        provenance=Provenance(masses=tuple(problem.masses)),
+        provenance=Provenance(
+            masses=tuple(problem.masses),
+            switched_power=float(np.mean(powers)) if powers else None,
+        ),
     )
     notes = () if identified else (Message.of("calibration.delay_unknown"),)
     for note in notes:

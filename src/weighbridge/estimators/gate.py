@@ -26,10 +26,8 @@ class GateSettings:
         cruise of 0.07. Of nine cuts with 0.08 to 0.12 all intervals hold, 5.1 % RMS; parts of
         highway drives have 0.14 and more, ordinary drives 0.25 to 0.4
     widest : standard deviation over the mass above which no mass is given [-]: the interval of
-        95 % is 30 % to both sides then
-    widest_of_drive : the same by the drive itself, the vehicle file aside [-].
-        Intervals beyond hold as well, but a quarter of the masses were more than 10 % off, below
-        one in 100
+        95 % is 30 % to both sides then. Of 141 cuts of drives that leave 8 to 15 %, of vehicles
+        never tuned on, 96 % of the intervals hold
 
     Raises
     ------
@@ -42,7 +40,6 @@ class GateSettings:
     least_time: float = 20.0
     least_spread: float = 0.08
     widest: float = 0.15
-    widest_of_drive: float = 0.08
 
     def __post_init__(self) -> None:
         for field in fields(GateSettings):

@@ -246,8 +246,7 @@ def _enough_rows(found: Evidence, _: Vehicle) -> tuple[Status, Problem | None]:
 
 def _narrow_enough(found: Evidence, vehicle: Vehicle) -> tuple[Status, Problem | None]:
     mass, half_width = found.mass, found.half_width
-    narrow = np.isfinite(half_width) and half_width <= 1.96 * found.gate.widest * abs(mass)
-    if narrow and found.drive_std <= found.gate.widest_of_drive * abs(mass):
+    if np.isfinite(half_width) and half_width <= 1.96 * found.gate.widest * abs(mass):
         return _PASSED
     low, high = vehicle.of_class.mass_range
     if mass + half_width < low or mass - half_width > high:

@@ -23,7 +23,6 @@ EARLY: Final = {
     "fewest_blocks": 2,
     "least_time": 10.0,
     "widest": 0.0765,
-    "widest_of_drive": 0.0765,
 }
 """What a mass needs to be shown before `weighbridge.estimators.gate.GATE` lets it through: an
 interval of at most 15 % to both sides. Of ten drives of another simulator, never tuned on, seven

@@ -67,7 +67,7 @@ _KEPT: Final[dict[MotionSource, _Kept]] = {
 _UNSURE: Final = 2.5
 """Standard deviation by the drive alone from which a mass may not come [%]."""
 
-_HOPELESS: Final = 100.0 * GATE.widest_of_drive
+_HOPELESS: Final = 100.0 * GATE.widest
 """The same from which none comes [%]: the gate of every method."""
 
 _SHORT: Final = 150.0

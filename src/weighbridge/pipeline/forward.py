@@ -9,7 +9,6 @@ way gets the same numbers to the last bit.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final, NamedTuple
 
@@ -250,10 +249,8 @@ def too_wide(state: ForwardState | None, setup: ForwardSetup | None) -> float:
     if state is None or setup is None or not state.joint.windows:
         return 0.0
     joint, sizes = state.joint, setup.joint
-    gate = sizes.settings
     std = joint.std(sizes) / abs(joint.mass)
-    of_drive = math.sqrt(max(std**2 - sizes.systematic_std**2, 0.0))
-    return std if std > gate.widest or of_drive > gate.widest_of_drive else 0.0
+    return std if std > sizes.settings.widest else 0.0
 
 
 def lateness(setup: ForwardSetup) -> float:

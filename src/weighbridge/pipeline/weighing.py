@@ -195,8 +195,25 @@ def _refuse_unknown(method: str) -> None:
 def weigh_checked(drive: Drive, vehicle: Vehicle, method: str, settings: Any = None) -> Weighing:
     """Weigh as `weigh` does, from a drive that was checked and a known method.
 
+    A drive whose inertial sensor is too noisy for a mass is weighed without it.
     ``settings`` are those of the estimator; its defaults when None.
     """
+    found = _weigh_all(drive, vehicle, method, settings)
+    less = without_accelerometer(drive)
+    if found.reason_id not in NOISY or len(less.signals) == len(drive.signals):
+        return found
+    left = _weigh_all(less, vehicle, method, settings)
+    if left.status is not Status.CONVERGED or found.reason is None:
+        return found
+    return replace(left, problems=(Problem.of("imu.left_out", why=found.reason), *left.problems))
+
+
+NOISY: Final = ("motion.wide", "imu.noise")
+"""Reasons for no mass that an inertial sensor may be to blame for."""
+
+
+def _weigh_all(drive: Drive, vehicle: Vehicle, method: str, settings: Any) -> Weighing:
+    """Weigh by all signals of a drive."""
     problems = drive.problems
     alone = ESTIMATORS[method].speed_alone
     seen = without_accelerometer(drive) if ESTIMATORS[method].by_speed else drive

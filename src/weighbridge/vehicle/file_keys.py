@@ -347,6 +347,12 @@ SECTIONS: Final[dict[str, tuple[type[Any], tuple[Key, ...]]]] = {
                 "numbers",
             ),
             Key(
+                "switched_power",
+                "switched_power",
+                "of an accessory that went on and off in them",
+                suffix="w",
+            ),
+            Key(
                 "dbc", "dbc", "DBC files they were read with, seen from this file's folder", "texts"
             ),
             Key("notes", "notes", "free text", "text"),

@@ -37,6 +37,7 @@ class Provenance:
     torque_use : how far an error of the torque of one ``highest_torque``, at each of the knots of
         `weighbridge.estimators.torque_shape`, moved their masses, relative [-]; empty where it is
         not known
+    switched_power : of an accessory that went on and off in the drives [W]; None where none showed
     fit_cov : covariance of what was fitted, once the scale of every mass is known: lower
         triangle, row by row, of torque coefficients, curvature, slopes at the knots, drag area,
         rolling coefficient, engine and wheel inertia; empty where it is not known
@@ -59,6 +60,7 @@ class Provenance:
     std_factor: float | None = None
     highest_torque: float | None = None
     torque_use: tuple[float, ...] = ()
+    switched_power: float | None = None
     fit_cov: tuple[float, ...] = ()
     dbc: tuple[str, ...] = ()
     notes: str | None = None
@@ -72,6 +74,8 @@ class Provenance:
         positive("std_factor", self.std_factor)
         within("std_factor", self.std_factor, 0.1, 100.0)
         positive("highest_torque", self.highest_torque)
+        positive("switched_power", self.switched_power)
+        within("switched_power", self.switched_power, 1.0, 1e6, "W")
         for mass in self.masses:
             within("one of masses", mass, *MASSES, "kg")
         size = math.isqrt(2 * len(self.fit_cov))

@@ -167,7 +167,8 @@ def estimate(
     if balance.motion.source not in BY_SPEED:
         # Hills that nothing measures look alike.
         column = cut.mean(accessory_column(table, vehicle))
-        found = find_switched(asked.problem, column, solved.added, (solved.fast, solved.slow))
+        levels, known = (solved.fast, solved.slow), vehicle.provenance.switched_power
+        found = find_switched(asked.problem, column, solved.added, levels, known)
     if found is not None:
         asked = replace(
             asked,
