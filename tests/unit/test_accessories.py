@@ -72,6 +72,17 @@ def test_the_power_and_its_times_are_found(weighing):
     assert np.mean((found.on > 0.5) == truly) > 0.85
 
 
+def test_the_calibration_keeps_the_power_of_the_vehicle(car, weighing, made, tmp_path):
+    shown = car.provenance.switched_power
+    assert shown == pytest.approx(POWER, rel=0.25)
+    car.save(tmp_path / "car.toml")
+    kept = wb.Vehicle.load(tmp_path / "car.toml")
+    assert kept.provenance.switched_power == pytest.approx(shown, rel=1e-5)
+    free = replace(car, provenance=replace(car.provenance, switched_power=None))
+    off = [abs(wb.weigh(made.drive, v).result.switched.power - shown) for v in (car, free)]
+    assert off[0] < 0.8 * off[1]
+
+
 def test_nothing_is_found_where_nothing_is_switched(car):
     plain = wb.weigh(drive(0.0, 4103, payload=200.0).drive, car)
     assert plain.status == "converged"

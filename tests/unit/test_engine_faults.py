@@ -217,6 +217,19 @@ def test_a_noisy_accelerometer_is_not_taken_for_a_smoothed_torque(fleet):
     assert smoothed_torque(noisy, vehicle, noise=noise) is None
 
 
+def test_a_sensor_that_is_too_noisy_is_left_out(fleet):
+    drive = fleet.drive("electric")
+    rng = np.random.default_rng(11)
+    for name in ("accel_x", "accel_y", "accel_z"):
+        values = drive.signals[name].values
+        shaken = values + rng.normal(0.0, 6.0, values.size)
+        drive = drive.with_signals(replace(drive.signals[name], values=shaken))
+    found, less = fleet.weigh("electric", drive), without_accelerometer(drive)
+    assert found.mass == fleet.weigh("electric", less).mass
+    assert found.problems[0].id == "imu.left_out"
+    assert abs(found.mass - fleet.mass("electric")) < 1.96 * found.std
+
+
 def test_a_torque_of_the_other_sign_is_blamed_on_nothing_else(fleet):
     drive = fleet.drive("electric")
     turned = with_signal(drive, SOURCE["electric"], lambda t, x: -x)
