@@ -113,7 +113,7 @@ def test_a_good_drive_passes(method):
 
 @pytest.mark.parametrize("method", METHODS)
 def test_specific_force_that_hardly_varies_carries_no_mass(method):
-    cruise = balance(swing=0.065, minutes=30.0)
+    cruise = balance(swing=0.07, minutes=30.0)
     track = weighed(method, cruise, **ANY_WIDTH)
     assert track.status is Status.NOT_EXCITED
     assert track.reason.id == "motion.not_excited"

@@ -97,11 +97,14 @@ def smoothed_torque(
         if fast is None or not _lacking(fast, slow):
             continue
         quick, lasting = (float(force.sum() / motion.sum()) for force, motion in (fast, slow))
-        values = {"within": 2.0 * span, "quick": max(quick, 0.0), "slow": lasting}
+        quick = max(quick, 0.0)
         by_speed = _slopes(*signals, span, noise(span), balance.wheel_speed)
         if by_speed is not None and _there(by_speed, slow):
-            return Problem.of("imu.noise", **values)
-        return Problem.of("torque.smoothed", **values, source=vehicle.torque.of_source.name)
+            return Problem.of("imu.noise", within=2.0 * span, quick=quick, slow=lasting)
+        source = vehicle.torque.of_source.name
+        return Problem.of(
+            "torque.smoothed", within=2.0 * span, quick=quick, slow=lasting, source=source
+        )
     return None
 
 
