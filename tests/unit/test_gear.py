@@ -169,3 +169,8 @@ def test_idle_is_the_usual_speed_at_standstill_not_that_of_starts_and_feet():
     speed = np.concatenate((np.zeros(1700), np.full(900, 20.0), np.zeros(400)))
     assert idling(engine, speed) == pytest.approx(83.0, rel=0.01)
     assert idling(engine[2600:], speed[2600:]) == 0.0
+
+
+def test_a_start_of_the_engine_is_no_idle():
+    engine = np.concatenate((np.zeros(20), np.repeat([31.0, 31.4], 4), np.linspace(35.0, 90.0, 15)))
+    assert idling(engine, np.zeros(engine.size)) == 0.0

@@ -362,6 +362,10 @@ def shifting(time: Floats, gear: Ints, *, margin: float, ahead: float = math.inf
     return np.asarray(later | (time - instants[after - 1] <= margin))
 
 
+FEWEST_IDLING: Final = 10
+"""Fewer samples near each other may be a start of the engine [-]."""
+
+
 def idling(engine_speed: Floats, speed: Floats) -> float:
     """Most usual speed of an engine that runs while the vehicle stands.
 
@@ -375,11 +379,12 @@ def idling(engine_speed: Floats, speed: Floats) -> float:
     [rad/s]; 0 where none is seen
     """
     running = np.sort(engine_speed[_standing(engine_speed, speed)])
-    if running.size < 10:
-        return 0.0
     # The densest 2 %: starts, stops and a foot on the accelerator spread wide.
     end = np.searchsorted(running, 1.02 * running, side="right")
-    densest = int(np.argmax(end - np.arange(running.size)))
+    count = end - np.arange(running.size)
+    if np.max(count, initial=0) < FEWEST_IDLING:
+        return 0.0
+    densest = int(np.argmax(count))
     return float(np.median(running[densest : end[densest]]))
 
 

@@ -6,6 +6,7 @@ from typing import Final
 
 import numpy as np
 
+from weighbridge.constants import GRAVITY
 from weighbridge.estimators.joint.slow_errors import NAMES, prior_std
 from weighbridge.estimators.track import MassTrack
 from weighbridge.messages import Problem
@@ -25,6 +26,8 @@ DOUBTFUL: Final = 4.0
 def stretched(track: MassTrack, vehicle: Vehicle) -> float:
     """How far the drive takes slow resistance and drag area from the vehicle file [-].
 
+    A grade that is off by a constant, as it may be without GNSS, looks like a resistance.
+
     Parameters
     ----------
     track : of the joint estimator
@@ -35,7 +38,9 @@ def stretched(track: MassTrack, vehicle: Vehicle) -> float:
         return 0.0
     # The torque is only the size of the cold start's.
     prior = dict(zip(NAMES, prior_std(vehicle, track.mass, 1.0), strict=False))
-    resistance = float(np.sqrt(np.mean(slow.resistance**2))) / prior["resistance"]
+    grade = GRAVITY * track.mass * float(np.median(track.balance.motion.grade_std))
+    std = float(np.hypot(prior["resistance"], grade))
+    resistance = float(np.sqrt(np.mean(slow.resistance**2))) / std
     area, _ = slow.constants["drag_area"]
     drag = area / prior["drag_area"] if prior["drag_area"] > 0.0 else 0.0
     return float(np.hypot(resistance, drag))

@@ -55,6 +55,9 @@ SURE: Final = 6.0
 """Gain of the logarithm of the likelihood, prior included, that shows a switch: 50 drives of a
 second model without one had 0.4 at most, those with one 10 to 150."""
 
+SURE_KNOWN: Final = 0.0
+"""The same of a power that the calibration has shown: the likelier of the two counts."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Switched:
@@ -112,9 +115,9 @@ def find_switched(
             problem.time, problem.rows, problem.y, noise, power * column, added, how,
         )  # fmt: skip
 
-    usual, spread = problem.std[0] * USUAL_POWER, POWER_SPREAD
+    usual, spread, sure = problem.std[0] * USUAL_POWER, POWER_SPREAD, SURE
     if known is not None:
-        usual, spread = known, KNOWN_SPREAD
+        usual, spread, sure = known, KNOWN_SPREAD, SURE_KNOWN
 
     def power_of(size: float) -> float:
         return float(usual * np.exp(spread * size))
@@ -135,7 +138,7 @@ def find_switched(
     corners = tried[best] + np.vstack((np.zeros(3), np.diag([0.2, -0.3, 0.4])))
 
     def stop_where_small(intermediate_result: OptimizeResult) -> None:
-        if intermediate_result.x[2] < SMALL and without - intermediate_result.fun < SURE:
+        if intermediate_result.x[2] < SMALL and without - intermediate_result.fun < sure:
             raise StopIteration
 
     found = minimize(
@@ -143,7 +146,7 @@ def find_switched(
         options={"initial_simplex": corners, "xatol": CLOSE, "fatol": CLOSE},
     )  # fmt: skip
     gain = without - float(found.fun)
-    if gain < SURE:
+    if gain < sure:
         return None
     power = power_of(float(found.x[2]))
     on, _ = told(found.x, power)
