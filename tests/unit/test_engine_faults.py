@@ -222,7 +222,7 @@ def test_a_sensor_that_is_too_noisy_is_left_out(fleet):
     rng = np.random.default_rng(11)
     for name in ("accel_x", "accel_y", "accel_z"):
         values = drive.signals[name].values
-        shaken = values + rng.normal(0.0, 6.0, values.size)
+        shaken = values + rng.normal(0.0, 3.0, values.size)
         drive = drive.with_signals(replace(drive.signals[name], values=shaken))
     found, less = fleet.weigh("electric", drive), without_accelerometer(drive)
     assert found.mass == fleet.weigh("electric", less).mass
