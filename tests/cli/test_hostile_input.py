@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 import pytest
+from tests.noted import error
 
 from weighbridge.errors import ConfigError, DriveError
 from weighbridge.io import read_drive
@@ -126,7 +127,7 @@ def test_decorated_comments_and_long_lists_are_no_keys(tmp_path):
     ],
 )  # fmt: skip
 def test_numbers_that_no_vehicle_has(build, values):
-    with pytest.raises(ConfigError, match=r"must be"):
+    with error(ConfigError):
         build(**values)
 
 
@@ -206,7 +207,7 @@ def test_a_column_of_category_names_is_refused(tmp_path):
     frame.with_columns(pl.col("vehicle_speed_kmh").cast(pl.Categorical)).write_parquet(
         tmp_path / "obd.parquet"
     )
-    with pytest.raises(DriveError, match="holds text such as 'fast'"):
+    with error(DriveError, "obd.parquet vehicle_speed_kmh fast 1"):
         read_drive(tmp_path / "obd.parquet")
 
 

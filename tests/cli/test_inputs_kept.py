@@ -6,6 +6,7 @@ from pathlib import Path
 
 import polars as pl
 import pytest
+from tests.noted import error
 
 from weighbridge.cli.results import Result, asked_for, inputs, refuse_folder, refuse_results
 from weighbridge.errors import ConfigError
@@ -182,7 +183,7 @@ def test_earlier_results_of_the_same_kind_are_replaced(tmp_path):
             refuse_results(inputs(), [Result("-o", path, kind)])
         for other in {*texts, "notes"} - {text}:
             path.write_text(other)
-            with pytest.raises(ConfigError, match=f"is there already and is no {kind}"):
+            with error(ConfigError, f"is there already and is no {kind}"):
                 refuse_results(inputs(), [Result("-o", path, kind)])
     for name in ("t.csv", "t.parquet"):
         path = tmp_path / name
@@ -203,7 +204,7 @@ def test_devices_and_new_files_are_free(drive, car, tmp_path):
     refuse_results(read, asked_for(track=drive / "new.csv", report=tmp_path / "a", json="-"))
     refuse_folder(read, tmp_path / "new")
     refuse_folder(read, drive / "sub")
-    with pytest.raises(ConfigError, match="the drive itself"):
+    with error(ConfigError, "drive"):
         refuse_folder(read, drive)
 
 

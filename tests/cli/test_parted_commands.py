@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import polars as pl
 import pytest
+from tests.noted import error
 
 from weighbridge.cli.calibrate import masses_of_parts
 from weighbridge.errors import ConfigError
@@ -77,5 +78,5 @@ def test_masses_are_of_all_or_of_each_recording_or_of_each_drive():
     assert masses_of_parts(drives(2, 1), [9e3]) == [9e3, 9e3, 9e3]
     assert masses_of_parts(drives(2, 1), [9e3, 8e3]) == [9e3, 9e3, 8e3]
     assert masses_of_parts(drives(2, 1), [9e3, 8e3, 7e3]) == [9e3, 8e3, 7e3]
-    with pytest.raises(ConfigError, match="4 masses for 3 drives in 2"):
+    with error(ConfigError, "4 3 2 --mass"):
         masses_of_parts(drives(2, 1), [9e3, 8e3, 7e3, 6e3])

@@ -12,6 +12,7 @@ import pytest
 
 import weighbridge as wb
 from tests.fleet.fleets import real_fleet, tiny_drive
+from tests.noted import error
 from weighbridge.errors import ConfigError
 from weighbridge.fleet.learning import (
     MOST,
@@ -100,7 +101,7 @@ def test_a_vehicle_that_kills_its_worker_loses_nothing_of_the_others(
 def test_learning_never_writes_over_what_is_read(tiny, tmp_path, scheduler):
     drives, cars = tiny
     tickets = tickets_at(tmp_path / "t.csv")
-    with pytest.raises(ConfigError, match="holds the vehicle files that are read"):
+    with error(ConfigError, "vehicles --learn"):
         wb.fleet.weigh_drives(drives, cars, tmp_path / "r", learn=cars, tickets=tickets)
     other = tmp_path / "other"
     other.mkdir()

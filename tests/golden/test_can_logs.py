@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from make_can_logs import STEPS, SUFFIXES, truth
 from numpy.testing import assert_allclose, assert_array_equal
-from tests.noted import refused, says
+from tests.noted import error, refused, says
 
 from weighbridge.errors import ConfigError, DriveError
 from weighbridge.io import read_drive
@@ -69,7 +69,7 @@ def test_what_a_mapping_names_goes_before_answers():
 
 def test_ambiguous_and_missing_validity_are_refused():
     mapping = {"signals": {"altitude": {"column": "Height", "valid": "HeightOk"}}}
-    with pytest.raises(ConfigError, match=r"no such signal; it has Valid, Kind"):
+    with error(ConfigError, "altitude HeightOk Sensor Valid Kind"):
         read_drive(HERE / "can.mf4", mapping, DBC)
 
 
@@ -105,7 +105,7 @@ def test_pieces_whose_dates_are_rounded_are_joined(tmp_path):
 
 
 def test_the_same_frames_twice_are_refused(tmp_path):
-    with pytest.raises(DriveError, match="same frames at the same time"):
+    with error(DriveError, "can.asc can.blf"):
         read_drive([HERE / "can.asc", HERE / "can.blf"])
     # A piece shorter than dates may be off by is no rounding where it lies inside another.
     lines = (HERE / "can.log").read_text().splitlines(keepends=True)

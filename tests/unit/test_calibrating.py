@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from numba import config
-from tests.noted import refused, says
+from tests.noted import error, refused, says
 
 from weighbridge import CalibrationSettings, Vehicle, calibrate, weigh
 from weighbridge.balance import force_balance
@@ -309,7 +309,7 @@ def test_a_mass_no_car_has(empty, mass):
 
 
 def test_masses_that_do_not_fit_the_drives(empty):
-    with pytest.raises(ConfigError, match="2 masses for 1 drives"):
+    with error(ConfigError, "2 1"):
         calibrate([empty.drive], [1500.0, 1600.0])
     with pytest.raises(ConfigError, match="no drive"):
         calibrate([])
@@ -364,7 +364,7 @@ def test_the_air_flow_of_a_diesel_is_refused_by_its_cause(part, engine, why):
 
 
 def test_an_order_for_measured_torque_is_refused(electric):
-    with pytest.raises(ConfigError, match="offset and a scale only"):
+    with error(ConfigError, "measured --order 1"):
         calibrate(electric, settings=CalibrationSettings(order=1))
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 import pytest
+from tests.noted import error
 
 from weighbridge.errors import ConfigError, DriveError
 from weighbridge.io import FORMATS, Takes, read_drive
@@ -112,7 +113,7 @@ def test_a_mapping_for_all_files_is_for_those_that_can_use_it(tmp_path):
         f'<trkpt lat="1.{k}" lon="2"><time>2020-01-01T00:00:0{k}Z</time></trkpt>' for k in range(3)
     )
     (tmp_path / "b.gpx").write_text(f"<gpx><trk><trkseg>{points}</trkseg></trk></gpx>")
-    with pytest.raises(ConfigError, match=r"b\.gpx is GPX"):
+    with error(ConfigError, "b.gpx GPX rate_hz"):
         read_drive(tmp_path / "b.gpx", NAMED)
     drive = read_drive(tmp_path, NAMED)
     np.testing.assert_array_equal(drive.signals["vehicle_speed"].values, 10.0)

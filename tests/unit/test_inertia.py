@@ -7,7 +7,7 @@ import numpy as np
 import polars as pl
 import pytest
 from numpy.testing import assert_allclose
-from tests.noted import refused, says
+from tests.noted import error, refused, says
 from tests.unit.test_report import unpacked
 
 from weighbridge.errors import ConfigError
@@ -111,7 +111,7 @@ def test_settings_by_name_are_those_of_the_filter(made):
     # A density of 1 kg²/s lets the mass move by a kilogram in a second.
     off = [abs(w.track.parameters[-1, 0] / made.inertias[-1, 0] - 1.0) for w in (told, usual)]
     assert off[0] > 0.03 > 1.5 * off[1]
-    with pytest.raises(ConfigError, match="noise_densities must be 3 positive numbers"):
+    with error(ConfigError, "noise_densities 3 1.0"):
         estimate_inertia(made.drive, CAR, settings={"noise_densities": [1.0]})
     with pytest.raises(ConfigError, match="there is no setting 'jumprate'"):
         estimate_inertia(made.drive, CAR, settings={"jumprate": 1.0})
@@ -126,7 +126,7 @@ def test_a_filter_fed_sample_by_sample_ends_where_the_ride_does(made):
     assert np.array_equal(live.parameters, whole.parameters[-1])
     low, high = live.interval()
     assert np.all((low < live.parameters) & (live.parameters < high))
-    with pytest.raises(ConfigError, match="period must be a positive number"):
+    with error(ConfigError, "0.0"):
         InertiaFilter(RIDE, 0.0)
 
 
@@ -202,7 +202,7 @@ def test_missing_signals_are_named(made):
 
 
 def test_vehicle_without_suspension_is_refused(made):
-    with pytest.raises(ConfigError, match=r"truck has no \[ride\] section"):
+    with error(ConfigError, "truck [ride]"):
         estimate_inertia(made.drive, replace(CAR, ride=None))
     with pytest.raises(ConfigError, match="unknown method 'kalman'"):
         estimate_inertia(made.drive, CAR, "kalman")

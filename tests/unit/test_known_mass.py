@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import pytest
-from tests.noted import refused
+from tests.noted import error, refused
 
 import weighbridge as wb
 from weighbridge.calibration.known_mass import POUND, check_mass, drag_finding, scale_finding
@@ -69,7 +69,7 @@ def test_a_torque_twice_too_strong_is_pounds():
 def test_a_mass_of_a_truck_leads_to_its_class():
     words = r"drive: taken for a car, .* weighbridge vehicle new --class truck -o base.toml"
     for kg in (10_203.0, 4000.0):
-        with pytest.raises(ConfigError, match=words):
+        with error(ConfigError, words):
             check_mass(DRIVE, kg, Vehicle(kind="car"))
     check_mass(DRIVE, 10_203.0, Vehicle(kind="truck"))
 

@@ -5,6 +5,7 @@ from threading import Event, Thread
 
 import numpy as np
 import pytest
+from tests.noted import error
 from tests.simulated_ecu import SimulatedEcu
 from tests.unit.test_stream import truck_rows
 
@@ -135,7 +136,7 @@ def test_what_is_asked_of_the_interface(monkeypatch):
 
     monkeypatch.setattr(can, "Bus", bus)
     for text in ("can:slcan:/dev/ttyACM0@500000", "can:socketcan:can1"):
-        with pytest.raises(SourceError, match="is the interface there"):
+        with error(SourceError, "can:slcan:/dev/ttyACM0@500000"):
             parse_source(text, listen_only=True).run(lambda _: None, Event())
     assert asked[0]["bitrate"] == 500000
     assert asked[0]["listen_only"]
@@ -153,7 +154,7 @@ def test_places_that_cannot_be(text):
 
 
 def test_interface_that_no_one_knows():
-    with pytest.raises(ConfigError, match="correct its name"):
+    with error(ConfigError, "can:no_such_thing:can0 python-can"):
         parse_source("can:no_such_thing:can0").run(lambda _: None, Event())
 
 

@@ -9,6 +9,7 @@ from threading import Event
 
 import numpy as np
 import pytest
+from tests.noted import error
 
 from weighbridge.errors import ConfigError, DriveError, SourceError
 from weighbridge.io.nmea import read_sentence
@@ -256,7 +257,7 @@ def test_a_port_in_use_is_told(drive):
     ports = free_ports()
     with (
         socket.create_server(("127.0.0.1", ports["adapter"])),
-        pytest.raises(SourceError, match=f"port {ports['adapter']} cannot be used"),
+        error(SourceError, f"port {ports['adapter']} cannot be used"),
         devices(Played(drive), **ports, stop=Event()),
     ):
         pass

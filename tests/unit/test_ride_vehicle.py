@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+from tests.noted import error
 
 from weighbridge.errors import ConfigError
 from weighbridge.vehicle.model import Ride, Vehicle
@@ -49,6 +50,6 @@ def test_faults_are_told_with_their_key(tmp_path, old, new, told):
 def test_noise_must_be_possible():
     good = Vehicle.load(EXAMPLE).ride
     assert good is not None
-    with pytest.raises(ConfigError, match="roll_rate_noise must be a positive number"):
+    with error(ConfigError, "roll_rate_noise 0.0"):
         Ride(**{name: getattr(good, name) for name in Ride.__slots__ if name != "roll_rate_noise"},
              roll_rate_noise=0.0)  # fmt: skip

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import pytest
-from tests.noted import has
+from tests.noted import error, has
 
 import weighbridge as wb
 from weighbridge.errors import ConfigError
@@ -55,7 +55,7 @@ def test_what_cannot_be_set_is_one_sentence(method, given, said):
 
 def test_a_method_without_settings_says_so():
     bare = replace(ESTIMATORS["rls"], settings=None)
-    with pytest.raises(ConfigError, match="method rls has no settings, got gate"):
+    with error(ConfigError, "rls gate"):
         bare.settings_of({"gate": 5.0})
 
 
@@ -72,13 +72,13 @@ def test_texts_are_read_as_toml():
 
 @pytest.mark.parametrize("text", ["forgetting", "=1", "gate=", "gate=5;0", "gate=1\nmass=2"])
 def test_a_text_of_another_form_is_one_sentence(text):
-    with pytest.raises(ConfigError, match=r"write NAME=VALUE|is expected after =") as refused:
+    with error(ConfigError, "=") as refused:
         parsed([text])
     assert "\n" not in str(refused.value)
 
 
 def test_a_name_twice_is_refused():
-    with pytest.raises(ConfigError, match="gate is set twice"):
+    with error(ConfigError, "gate"):
         parsed(["gate=1", "gate=2"])
 
 

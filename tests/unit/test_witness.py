@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.signal import lfilter
-from tests.noted import refused
+from tests.noted import error, refused
 
 import weighbridge as wb
 from weighbridge.balance.disagreement import accepted_scales, findings
@@ -397,7 +397,7 @@ def test_a_relation_is_one_of_a_known_signal():
         ({"span": 0.0}, "span must be a positive"),
         ({"blur": -1.0}, "blur must be zero or positive"),
     ):
-        with pytest.raises(wb.ConfigError, match=words):
+        with error(wb.ConfigError, words):
             replace(good, **fields)
     with pytest.raises(wb.ConfigError, match="may be named once"):
         replace(CAR, witnesses=(good, good))
