@@ -7,9 +7,8 @@ from contextlib import contextmanager
 
 import pytest
 
-from weighbridge.errors import DriveError
+from weighbridge import DriveError, Problem
 from weighbridge.messages import PARTS, _phrases, catalogue
-from weighbridge.signals import Problem
 
 
 def noted(text: str, **more: object) -> Problem:

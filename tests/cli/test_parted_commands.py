@@ -6,11 +6,10 @@ from dataclasses import replace
 import numpy as np
 import polars as pl
 import pytest
-from tests.noted import error
+from tests.noted import error, named
 
+from weighbridge import ConfigError, Drive, Signal
 from weighbridge.cli.calibrate import masses_of_parts
-from weighbridge.errors import ConfigError
-from weighbridge.signals import Drive, Signal
 from weighbridge.simulation import make_scenario, simulate_car
 
 PAUSE = 900.0
@@ -69,7 +68,7 @@ def test_calibrate_says_which_drives_it_wants_the_masses_of(weighbridge, day, tm
     masses = ("--mass", 1580, "--mass", 1700, "--mass", 1800)
     ran = weighbridge("calibrate", day, *masses, "-o", tmp_path / "car.toml")
     assert ran.code == 2
-    assert "3 masses for 2 drives in 1 recording(s)" in ran.err
+    assert named(ran.err, "3 2 1 --mass")
     assert "day holds 2 drives: 0 to 240 s, 1140 to 1380 s" in ran.err
 
 

@@ -7,8 +7,7 @@ from numpy.testing import assert_allclose
 from tests.noted import error
 from tests.recipes import code, entry_points
 
-from weighbridge.errors import DriveError
-from weighbridge.io import read_drive
+from weighbridge import DriveError, read_drive
 from weighbridge.io.formats import formats
 
 READER = code("bang_logs.py")

@@ -8,7 +8,7 @@ import pytest
 from tests.noted import error
 from tests.recipes import code, entry_points
 
-from weighbridge.errors import ConfigError
+from weighbridge import ConfigError
 from weighbridge.live.feed import Feed
 from weighbridge.live.sources import SOURCES, parse_source
 

@@ -7,11 +7,10 @@ import pytest
 
 from tests.fleet.fleets import tiny_drive, tiny_fleet
 from tests.noted import error
-from weighbridge.errors import ConfigError, DriveError
+from weighbridge import ConfigError, Drive, DriveError
 from weighbridge.fleet.inputs import Recording, recordings
 from weighbridge.fleet.store import Results
 from weighbridge.fleet.vehicles import Vehicles
-from weighbridge.signals import Drive
 from weighbridge.vehicle.known import Known, describe
 
 
@@ -70,7 +69,7 @@ def test_results_are_never_drives(tree):
 @pytest.mark.parametrize("name", ["nowhere", "nothing/**", "none*"])
 def test_what_is_not_there_is_told(tmp_path, name):
     (tmp_path / "nothing").mkdir()
-    with error(DriveError):
+    with error(DriveError, tmp_path / name):
         names(tmp_path / name)
 
 
@@ -160,7 +159,7 @@ def test_an_impossible_class_is_told(shelf):
 
 
 def test_no_folder_of_vehicles(tmp_path):
-    with error(ConfigError):
+    with error(ConfigError, tmp_path / "none"):
         Vehicles(tmp_path / "none")
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from tests.fleet.fleets import compared, copy_of, tiny_drive, tiny_fleet
 from tests.noted import error
-from weighbridge.errors import ConfigError
+from weighbridge import ConfigError
 from weighbridge.fleet import read_drives, read_segments, write_delta
 from weighbridge.fleet.job import weigh_job
 from weighbridge.fleet.run import FleetSettings, prepared
@@ -305,12 +305,9 @@ def test_a_folder_without_a_file_of_the_fleet_is_refused(tmp_path):
     (tmp_path / "wrong").mkdir()
     shutil.copy(cars / "van0.toml", tmp_path / "wrong" / "bus.toml")
     (tmp_path / "empty").mkdir()
-    told = (
-        r"no vehicle of the fleet has a file there: the drives are of van0, van1, van2 and 3 more"
-    )
-    with error(ConfigError, rf"{told}, the files of bus; .*--class car"):
+    with error(ConfigError, "van0 van1 van2 3 bus --class"):
         run(tmp_path, vehicles="wrong")
-    with pytest.raises(ConfigError, match=f"{told}, the files of none"):
+    with error(ConfigError, "van0 van1 van2 3 none --class"):
         run(tmp_path, vehicles="empty")
     assert not (tmp_path / "results").exists()
     assert set(run(tmp_path, vehicles="wrong", kind="van")["vehicle_class"]) == {"van"}

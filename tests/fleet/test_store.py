@@ -10,7 +10,7 @@ import polars as pl
 import pytest
 
 from tests.noted import error
-from weighbridge.errors import ConfigError
+from weighbridge import ConfigError
 from weighbridge.fleet import read_drives, read_segments
 from weighbridge.fleet import store as store_module
 from weighbridge.fleet.reading import collected
@@ -204,9 +204,9 @@ def test_a_damaged_part_is_told(results, how):
 
 def test_a_folder_of_something_else_is_left_alone(tmp_path):
     (tmp_path / "letter.txt").write_text("dear")
-    with error(ConfigError):
+    with error(ConfigError, tmp_path):
         Results.begun(tmp_path)
-    with pytest.raises(ConfigError, match="holds no results"):
+    with error(ConfigError, tmp_path):
         read_drives(tmp_path)
     assert [f.name for f in tmp_path.iterdir()] == ["letter.txt"]
 

@@ -11,8 +11,7 @@ from make_openpilot_log import AGE, START, STEP, STEPS, truth
 from numpy.testing import assert_allclose
 from tests.noted import error, has
 
-from weighbridge.errors import DriveError, MissingExtraError
-from weighbridge.io import read_drive
+from weighbridge import DriveError, MissingExtraError, read_drive
 from weighbridge.io.bus_draft import draft_bus
 from weighbridge.io.dbc import load_dbcs
 from weighbridge.io.formats import format_of

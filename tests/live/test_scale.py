@@ -1,6 +1,7 @@
 """A live scale beside the forward pass of the recorded drive, whatever the way samples come."""
 
 import copy
+import re
 from dataclasses import replace
 from itertools import pairwise
 from typing import NamedTuple
@@ -11,15 +12,13 @@ import pytest
 import weighbridge as wb
 from tests.live.conftest import PHONE
 from tests.noted import error
+from weighbridge import ConfigError, LiveStatus
 from weighbridge.balance.averaging import WINDOW
-from weighbridge.errors import ConfigError
 from weighbridge.estimators.judging import STOP
 from weighbridge.live.arrival import health_of
-from weighbridge.live.checkpoint import VERSION
 from weighbridge.live.learning import _nothing
 from weighbridge.live.on_the_move import REST, OnTheMove
 from weighbridge.live.records import LATENESS, Records
-from weighbridge.live.weighing import LiveStatus
 from weighbridge.pipeline.forward import (
     begin,
     forward_weigh,
@@ -307,7 +306,7 @@ def test_a_checkpoint_loses_nothing(short, weighing, forward, half_driven):
     [
         lambda b: b[: len(b) // 2],
         lambda b: b.replace('"d"', '"x"', 1),
-        lambda b: b.replace(f'checkpoint": {VERSION}', 'checkpoint": 99', 1),
+        lambda b: re.sub(r'checkpoint": \d+', 'checkpoint": 99', b, count=1),
         lambda b: "\xff" + b,
         lambda b: "",
     ],

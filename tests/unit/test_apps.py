@@ -7,8 +7,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from tests.noted import error, has
 
-from weighbridge.errors import DriveError
-from weighbridge.io import read_drive
+from weighbridge import DriveError, read_drive
 
 
 def write(path, text):
@@ -55,9 +54,13 @@ def test_racechrono(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("Format,3", "Format,2", "export the session as CSV v3"),
+        ("Format,3", "Format,2", "session.csv RaceChrono v2 v3"),
         ("timestamp,", "Time (s),", "session.csv"),
-        (CHRONO[CHRONO.index("timestamp") :], "timestamp,a\nunix time,\n,\n1,2\n", "no column"),
+        (
+            CHRONO[CHRONO.index("timestamp") :],
+            "timestamp,a\nunix time,\n,\n1,2\n",
+            "session.csv timestamp a",
+        ),
     ],
 )
 def test_racechrono_of_another_kind(tmp_path, old, new, said):

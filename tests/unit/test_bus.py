@@ -5,7 +5,7 @@ from test_dbc import write
 from test_frames import make
 from tests.noted import error, refused, says
 
-from weighbridge.errors import ConfigError
+from weighbridge import ConfigError
 from weighbridge.io.bus import decode
 from weighbridge.io.dbc import load_dbcs
 from weighbridge.io.frames import Frames, join_frames

@@ -8,10 +8,9 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from tests.noted import error, has, refused
 
-from weighbridge.errors import DriveError, MissingExtraError
+from weighbridge import DriveError, MissingExtraError, read_drive
 from weighbridge.io.formats import format_of
 from weighbridge.io.frame_text import read_candump
-from weighbridge.io.read import read_drive
 
 START = 1_600_000_000.0
 

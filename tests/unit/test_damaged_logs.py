@@ -11,8 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from tests.noted import error
 
-from weighbridge.errors import WeighbridgeError
-from weighbridge.io import read_drive
+from weighbridge import WeighbridgeError, read_drive
 
 GOLDEN = Path(__file__).parents[1] / "golden"
 LOGS = {s: (GOLDEN / f"can.{s}").read_bytes() for s in ("blf", "asc", "trc", "log", "csv", "mf4")}
@@ -138,7 +137,7 @@ def fault_of(child):
 
 @pytest.mark.parametrize("suffix", LOGS)
 @settings(
-    max_examples=20,
+    max_examples=12,
     deadline=None,
     derandomize=True,
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],

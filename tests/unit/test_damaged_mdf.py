@@ -14,8 +14,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from tests.noted import error, has
 
-from weighbridge.errors import DriveError, WeighbridgeError
-from weighbridge.io import read_drive
+from weighbridge import DriveError, WeighbridgeError, read_drive
 from weighbridge.io.mdf_repair import corrected, guard
 from weighbridge.messages import phrase
 
@@ -166,7 +165,7 @@ def test_a_file_without_its_data_is_refused_in_a_sentence(tmp_path):
     with error(DriveError, "log.mf4 200"):
         read_drive(path)
     path.write_bytes(raw[:300])
-    with pytest.raises(DriveError, match="nothing is whole"):
+    with error(DriveError, "log.mf4"):
         read_drive(path)
 
 
@@ -352,13 +351,13 @@ def test_one_long_value_does_not_fill_the_memory():
     data = struct.pack("<I", long) + bytes(long) + bytes(4)
     offsets = np.full(10_000, long + 4, np.uint64)
     offsets[0] = 0
-    with error(ValueError, f"claims {long} bytes"):
+    with error(ValueError, long):
         mdf_v4.extract(data, True, offsets)
 
 
 @pytest.mark.parametrize("layout", LAYOUTS)
 @settings(
-    max_examples=25,
+    max_examples=15,
     deadline=None,
     derandomize=True,
     suppress_health_check=[HealthCheck.function_scoped_fixture],

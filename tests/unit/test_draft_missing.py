@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from tests.noted import error
 
-from weighbridge.errors import DriveError
-from weighbridge.io import read_drive
+from weighbridge import DriveError, read_drive
 from weighbridge.io.draft import draft
 from weighbridge.io.draft_missing import missing
 from weighbridge.io.mapping_text import mapping_text

@@ -5,8 +5,7 @@ import pytest
 from tests.noted import error, has, says
 from tests.unit.test_alignment import road_speed
 
-from weighbridge.errors import DriveError
-from weighbridge.io import read_drive
+from weighbridge import DriveError, read_drive
 
 T = np.arange(0.0, 600.0, 0.5)
 SPEED = road_speed(T)

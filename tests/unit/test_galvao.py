@@ -7,9 +7,9 @@ import pytest
 from scipy.integrate import solve_ivp
 from tests.noted import error
 
+from weighbridge import ConfigError
 from weighbridge.balance.law import STANDARD_DENSITY, needed_force, rotating_mass
 from weighbridge.constants import GRAVITY
-from weighbridge.errors import ConfigError
 from weighbridge.estimators.settings import changed, parsed
 from weighbridge.papers import PAPERS, galvao, galvao_drives, galvao_torque
 from weighbridge.papers.galvao_bounds import (

@@ -8,16 +8,15 @@ import pytest
 from tests.noted import error
 
 import weighbridge as wb
-from weighbridge.balance import ForceBalance, Reason, force_balance
+from weighbridge import ConfigError, Status, Vehicle
+from weighbridge.balance import ForceBalance, ForceTable, Reason, force_balance
 from weighbridge.balance.cornering import HARD_CORNERING, cornering, lateral_acceleration
-from weighbridge.balance.table import ForceTable
-from weighbridge.errors import ConfigError
-from weighbridge.estimators import ESTIMATORS, Status, fit_std, judging
+from weighbridge.estimators import ESTIMATORS, fit_std, judging
 from weighbridge.estimators.fit_std import honest_std, slow_std
 from weighbridge.estimators.joint import foreign
 from weighbridge.pipeline.weighing import weigh_balance
 from weighbridge.simulation import MIDSIZE, Scenario, short_route, simulate_car
-from weighbridge.vehicle.model import Driveline, Provenance, RoadLoad, TorqueModel, Vehicle
+from weighbridge.vehicle.model import Driveline, Provenance, RoadLoad, TorqueModel
 
 METHODS = ("joint", "rls", "robust-rls", "ekf", "hybrid")
 ANY_WIDTH = {"widest": np.inf, "widest_of_drive": np.inf}

@@ -6,8 +6,7 @@ import numpy as np
 from numpy.testing import assert_allclose
 from tests.noted import error, has
 
-from weighbridge.errors import DriveError
-from weighbridge.io import read_drive
+from weighbridge import DriveError, read_drive
 from weighbridge.io.formats import format_of
 from weighbridge.io.mapping_text import mapping_text
 

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from tests.noted import error, has, refused, says
 
-from weighbridge.errors import DriveError, MissingExtraError
-from weighbridge.io import read_drive, read_table, write_drive, write_table
-from weighbridge.signals import QUANTITIES, Drive, DriveInfo, Signal
+from weighbridge import Drive, DriveError, DriveInfo, MissingExtraError, Signal, read_drive
+from weighbridge.io import read_table, write_drive, write_table
+from weighbridge.signals import QUANTITIES
 
 OBD = "time_s,vehicle_speed_kmh,engine_speed_rpm\n0,36,600\n0.5,54,\n1,72,1200\n"
 

@@ -9,7 +9,8 @@ from tests.noted import error
 from tests.simulated_ecu import SimulatedEcu
 from tests.unit.test_stream import truck_rows
 
-from weighbridge.errors import ConfigError, SourceError
+from weighbridge import ConfigError
+from weighbridge.errors import SourceError
 from weighbridge.live import feed as feed_module
 from weighbridge.live.feed import Feed
 from weighbridge.live.sources import canbus, parse_source
@@ -136,7 +137,7 @@ def test_what_is_asked_of_the_interface(monkeypatch):
 
     monkeypatch.setattr(can, "Bus", bus)
     for text in ("can:slcan:/dev/ttyACM0@500000", "can:socketcan:can1"):
-        with error(SourceError, "can:slcan:/dev/ttyACM0@500000"):
+        with error(SourceError, text):
             parse_source(text, listen_only=True).run(lambda _: None, Event())
     assert asked[0]["bitrate"] == 500000
     assert asked[0]["listen_only"]

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from tests.noted import error
 
-from weighbridge.errors import ConfigError, SourceError
+from weighbridge import ConfigError
+from weighbridge.errors import SourceError
 from weighbridge.live.feed import Feed
 from weighbridge.live.sources import parse_source
 from weighbridge.live.sources.elm import SETUP, ElmCarrier, ElmSource

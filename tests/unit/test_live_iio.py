@@ -4,7 +4,8 @@ from threading import Event, Thread
 import pytest
 from tests.noted import error
 
-from weighbridge.errors import ConfigError, SourceError
+from weighbridge import ConfigError
+from weighbridge.errors import SourceError
 from weighbridge.live.feed import Feed
 from weighbridge.live.sources import parse_source
 from weighbridge.live.sources.iio import IioSource

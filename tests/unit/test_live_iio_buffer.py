@@ -211,9 +211,9 @@ def no_trigger(home, imu):
     [
         (unplugged, "iio:device1: No such file"),
         (unbuffered, "enable: No such file"),
-        (unknown_type, "'le:s16/24>>0' is a type that cannot be"),
+        (unknown_type, "'le:s16/24>>0'"),
         (no_gyro, "in_anglvel_z_en: No such file"),
-        (no_trigger, "nothing came for 0.3 s"),
+        (no_trigger, " 0.3 s"),
     ],
 )
 def test_without_a_buffer_values_are_read_one_by_one(

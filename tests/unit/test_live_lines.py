@@ -10,7 +10,7 @@ import pytest
 from tests.noted import error
 from tests.unit.made_weighings import drive, weighing
 
-from weighbridge.errors import ConfigError, WeighbridgeError
+from weighbridge import ConfigError, WeighbridgeError
 from weighbridge.live.outputs import Outputs
 from weighbridge.live.outputs.lines import Lines, json_line
 
@@ -64,7 +64,7 @@ def test_what_holds_no_json_lines_is_refused_and_kept(tmp_path):
 
 
 def test_a_folder_is_refused_in_a_sentence(tmp_path):
-    with error(ConfigError):
+    with error(ConfigError, tmp_path):
         Lines(tmp_path)
 
 
@@ -93,8 +93,7 @@ def test_a_full_disk_is_told_and_leaves_whole_lines(tmp_path, pytestconfig):
     path = tmp_path / "masses.jsonl"
     words = [sys.executable, "-c", FULL, str(path), str(pytestconfig.rootpath)]
     ran = subprocess.run(words, capture_output=True, text=True, check=True)
-    assert "cannot be written" in ran.stdout
-    assert "weighing goes on" in ran.stdout
+    assert str(path) in ran.stdout
     rows = [json.loads(row) for row in path.read_text().splitlines()]
     assert rows[-1]["mass_kg"] == 1.0
     assert resource.getrlimit(resource.RLIMIT_FSIZE)[0] == resource.RLIM_INFINITY

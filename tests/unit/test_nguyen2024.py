@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from tests.noted import error
 
-from weighbridge.errors import ConfigError
+from weighbridge import ConfigError
 from weighbridge.estimators.settings import changed, parsed
 from weighbridge.papers import nguyen2024 as paper
 

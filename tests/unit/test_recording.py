@@ -8,12 +8,11 @@ import pytest
 from tests.noted import error
 from tests.unit.test_recorder import second
 
+from weighbridge import ConfigError, DriveError, Vehicle, read_drive
 from weighbridge.cli import record
-from weighbridge.errors import ConfigError, DriveError
-from weighbridge.io import read_drive
 from weighbridge.live.arrival import Arrivals, needs
 from weighbridge.live.recorder import Recorder
-from weighbridge.vehicle.model import TorqueModel, Vehicle
+from weighbridge.vehicle.model import TorqueModel
 
 
 class Feed:

@@ -10,12 +10,11 @@ from tests.noted import error
 from tests.unit.test_report import GEARINGS, VEHICLE, Elements, figures, make_weighing, numbers
 from tests.unit.test_weighing import weighing as weighed_by_rls
 
+from weighbridge import ConfigError, Drive, DriveInfo, Signal, Status, Weighing, compare
 from weighbridge.balance import ForceBalance, ForceTable, Reason
 from weighbridge.balance.instants import WIND_AT_VEHICLE
-from weighbridge.errors import ConfigError
-from weighbridge.estimators import ESTIMATORS, Status, joint
+from weighbridge.estimators import ESTIMATORS, joint
 from weighbridge.navigation.motion import Motion
-from weighbridge.pipeline.weighing import Weighing, compare
 from weighbridge.report import write_report
 from weighbridge.report.information_section import (
     Manoeuvre,
@@ -33,7 +32,6 @@ from weighbridge.report.residual_section import (
 )
 from weighbridge.report.slow_section import LONGEST_ARROW, slow_section, wind_at_vehicle
 from weighbridge.report.style import band, blank
-from weighbridge.signals import Drive, DriveInfo, Signal
 from weighbridge.vehicle.model import Provenance
 
 MASS = 1500.0

@@ -9,7 +9,7 @@ import pytest
 from tests.noted import error
 from tests.unit.test_report import Elements, figures, make_weighing, written
 
-from weighbridge.errors import ConfigError
+from weighbridge import ConfigError
 from weighbridge.report.tiles import MOST, Tiles
 
 SERVER = "https://tiles.example.org/{z}/{x}/{y}.png"

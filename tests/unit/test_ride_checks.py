@@ -3,9 +3,8 @@
 import numpy as np
 from tests.noted import error
 
-from weighbridge.errors import DriveError
+from weighbridge import Drive, DriveError, Problem, Signal
 from weighbridge.inertia.ride_checks import NEEDED, ride_samples
-from weighbridge.signals import Drive, Problem, Signal
 
 
 def test_a_clock_that_left_one_row_is_told_by_its_cause():

@@ -6,8 +6,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from tests.noted import error
 
-from weighbridge.errors import DriveError
-from weighbridge.io import read_drive
+from weighbridge import DriveError, read_drive
 from weighbridge.io.formats import format_of
 
 HEAD = (

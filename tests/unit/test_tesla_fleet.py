@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from tests.noted import error
 
-from weighbridge.errors import DriveError
-from weighbridge.io import read_drive
+from weighbridge import DriveError, read_drive
 
 START = dt.datetime(2026, 5, 1, 10, tzinfo=dt.UTC)
 MAPPING = {"signals": {"vehicle_speed": {"column": "VehicleSpeed", "unit": "mph"}}}

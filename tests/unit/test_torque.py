@@ -5,9 +5,8 @@ import pytest
 from numpy.testing import assert_allclose
 from tests.noted import error, refused
 
-from weighbridge.errors import ConfigError
-from weighbridge.signals import Drive, Signal
-from weighbridge.vehicle.model import TorqueModel, Vehicle
+from weighbridge import ConfigError, Drive, Signal, Vehicle
+from weighbridge.vehicle.model import TorqueModel
 from weighbridge.vehicle.torque import (
     engine_torque,
     knot_parts,

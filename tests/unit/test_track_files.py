@@ -17,11 +17,10 @@ from tests.noted import error
 from tests.unit.test_balance import CAR
 from tests.unit.test_weighing import weighing
 
+from weighbridge import ConfigError, Drive, MissingExtraError, Signal, Weighing, read_drive
 from weighbridge.cli.results import asked_for, inputs, refuse_results
-from weighbridge.errors import ConfigError, MissingExtraError
-from weighbridge.io import read_drive, write_mdf
-from weighbridge.pipeline.weighing import Weighing
-from weighbridge.signals import QUANTITIES, Drive, Signal
+from weighbridge.io import write_mdf
+from weighbridge.signals import QUANTITIES
 from weighbridge.signals.units import to_si
 
 

@@ -7,8 +7,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from tests.noted import error
 
-from weighbridge.errors import ConfigError, DriveError
-from weighbridge.io import read_drive
+from weighbridge import ConfigError, DriveError, read_drive
 
 TITLES = ("satellites", "time", "latitude", "longitude", "velocity kmh", "heading", "height")
 NAMES = "sats time lat long velocity heading height"

@@ -12,16 +12,14 @@ from scipy.stats import t as student
 from tests.noted import error, noted, refused
 from tests.unit.test_balance import CAR, CLOCK, MASS, STAMPS, accel_at, drive, motion, weighable
 
-from weighbridge import Status, weigh
+from weighbridge import ConfigError, Drive, DriveInfo, Signal, Status, Weighing, weigh
 from weighbridge.balance import force_balance
-from weighbridge.errors import ConfigError
 from weighbridge.estimators.judging import uncalibrated_std
 from weighbridge.estimators.rls import estimate
 from weighbridge.pipeline.notes import overload
-from weighbridge.pipeline.weighing import Weighing, without_mass
+from weighbridge.pipeline.weighing import without_mass
 from weighbridge.results.row import unread_row
 from weighbridge.results.weighing import TRACK_COLUMNS
-from weighbridge.signals import Drive, DriveInfo, Signal
 from weighbridge.vehicle.model import Provenance
 
 FIELDS = {
