@@ -45,8 +45,8 @@ MUTANTS = (
     ),
     Mutant(
         "io/vbo.py",
-        'take("long", "longitude", "deg", -1.0 / 60.0)',
-        'take("long", "longitude", "deg", 1.0 / 60.0)',
+        "_MINUTES: Final = (1.0 / 60.0, -1.0 / 60.0)",
+        "_MINUTES: Final = (1.0 / 60.0, 1.0 / 60.0)",
         "a sign",
         ("tests/unit/test_vbo.py", "tests/golden/test_position_logs.py"),
     ),

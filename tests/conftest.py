@@ -24,12 +24,9 @@ import pytest
 import weighbridge as wb
 from tests.drives import keep_drives
 from tests.order import guards, is_long, longest_first
-from weighbridge import simulation
+from weighbridge import DriveError, read_drive, simulation
 from weighbridge.cli import main
-from weighbridge.errors import DriveError
-from weighbridge.io import read_drive
-from weighbridge.simulation import make_scenario
-from weighbridge.simulation.simulate import SimulatedDrive
+from weighbridge.simulation import SimulatedDrive, make_scenario
 
 # Programs that tests start need not compile all they import, each time.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)

@@ -16,9 +16,8 @@ import pyarrow as pa
 
 import weighbridge
 from weighbridge import simulation
-from weighbridge.simulation.scenario import Scenario
-from weighbridge.simulation.simulate import SimulatedDrive
-from weighbridge.simulation.simulate import simulate_car as simulate
+from weighbridge.simulation import Scenario, SimulatedDrive
+from weighbridge.simulation import simulate_car as simulate
 
 SOURCES = Path(weighbridge.__file__).parent
 ROOMS = ("simulation", "signals", "vehicle", "kernels")

@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 
-from weighbridge.signals import Drive, Signal
-from weighbridge.vehicle.model import Driveline, RoadLoad, Vehicle
+from weighbridge import Drive, Signal, Vehicle
+from weighbridge.vehicle.model import Driveline, RoadLoad
 
 G, DENSITY, AREA, ROLLING, RADIUS = 9.80665, 1.225, 0.66, 0.011, 0.3
 CAR = Vehicle(

@@ -1,4 +1,4 @@
-"""Messages that tests make up, and errors by the id of their message."""
+"""Messages that tests make up, and errors by their id or by the values that they name."""
 
 import re
 import string
@@ -7,14 +7,36 @@ from contextlib import contextmanager
 
 import pytest
 
-from weighbridge.errors import DriveError
+from weighbridge import DriveError, Problem
 from weighbridge.messages import PARTS, _phrases, catalogue
-from weighbridge.signals import Problem
 
 
 def noted(text: str, **more: object) -> Problem:
     """Return a message with any text."""
     return Problem("plugin.note", text, **more)  # type: ignore[arg-type]
+
+
+def named(text: str, *values: object) -> bool:
+    """Return whether a text is one line that names each value, whatever its words.
+
+    A string holds several values, with spaces between them. 5 is not named by 15, 5.2 or n5.
+    """
+    pieces = " ".join(map(str, values)).split()
+    return len(text.splitlines()) == 1 and all(_named(text, piece) for piece in pieces)
+
+
+def _named(text: str, piece: str) -> bool:
+    before = r"(?<!\w)(?<!\d\.)" if re.match(r"\w", piece) else ""
+    after = r"(?!\w)(?!\.\d)" if re.search(r"\w$", piece) else ""
+    return re.search(before + re.escape(piece) + after, text) is not None
+
+
+@contextmanager
+def error(kind: type[Exception], *values: object) -> Iterator[pytest.ExceptionInfo]:
+    """Expect an error of one line that names each value; see `named`."""
+    with pytest.raises(kind) as found:
+        yield found
+    assert named(str(found.value), *values), (str(found.value), values)
 
 
 @contextmanager

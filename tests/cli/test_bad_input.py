@@ -9,7 +9,7 @@ import json
 import numpy as np
 import polars as pl
 import pytest
-from tests.noted import says
+from tests.noted import named, says
 
 import weighbridge as wb
 
@@ -29,13 +29,13 @@ def weighed(ran, truth, within):
 
 
 def refused(ran, *words, ids=()):
-    """Check that a command ended with one line that holds the words, or a message of these ids."""
+    """Check that a command ended with one line that names the values, or a message of these ids."""
     assert ran.code == 2
     assert ran.out == ""
     assert ran.err.startswith("weighbridge: ")
     assert ran.err.count("\n") == 1
     for word in words:
-        assert word in ran.err
+        assert named(ran.err, word)
     assert not ids or any(says(ran.err, id) for id in ids), ran.err
 
 
@@ -250,7 +250,7 @@ def test_files_of_no_bytes(weigh, tmp_path):
 
 
 def test_a_folder_without_a_drive(weigh, tmp_path):
-    refused(weigh(tmp_path), "no drive")
+    refused(weigh(tmp_path), str(tmp_path), "imu.csv")
 
 
 def twice(frame):

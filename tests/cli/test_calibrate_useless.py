@@ -7,7 +7,7 @@ from tests.noted import says
 
 from weighbridge import Vehicle, read_drive
 from weighbridge.cli.own_masses import own_masses
-from weighbridge.io.write import write_drive
+from weighbridge.io import write_drive
 from weighbridge.simulation import make_scenario, simulate_car
 
 AXES = ("accel_x", "accel_y", "accel_z", "gyro_x", "gyro_y", "gyro_z")

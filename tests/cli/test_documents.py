@@ -11,7 +11,7 @@ from typer.main import get_command
 from website import running
 
 from weighbridge.cli.main import app
-from weighbridge.io.write import write_drive
+from weighbridge.io import write_drive
 from weighbridge.simulation import make_scenario, simulate_car
 from weighbridge.simulation.ride import RideScenario, simulate_ride
 

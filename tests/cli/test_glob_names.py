@@ -7,9 +7,9 @@ import numpy as np
 import polars as pl
 import pytest
 
+from weighbridge import ConfigError, read_drive
 from weighbridge.cli.results import Result, inputs, refuse_results
-from weighbridge.errors import ConfigError
-from weighbridge.io import read_drive, read_table
+from weighbridge.io import read_table
 
 GOLDEN = Path(__file__).parent.parent / "golden"
 

@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 import pytest
+from tests.noted import error, named
 
-from weighbridge.errors import ConfigError, DriveError
-from weighbridge.io import read_drive
+from weighbridge import ConfigError, DriveError, Vehicle, read_drive
 from weighbridge.io.quiet import quietly
 from weighbridge.signals.tomlfile import read_toml
 from weighbridge.vehicle.model import (
@@ -23,7 +23,6 @@ from weighbridge.vehicle.model import (
     RoadLoad,
     SpeedModel,
     TorqueModel,
-    Vehicle,
 )
 
 GOLDEN = Path(__file__).parent.parent / "golden"
@@ -44,7 +43,7 @@ def refused(weighbridge, tmp_path):
         assert ran.err.startswith("weighbridge: ")
         assert ran.err.count("\n") == 1
         assert len(ran.err) < 2100
-        assert said in ran.err
+        assert named(ran.err, said)
 
     return check
 
@@ -67,8 +66,8 @@ TOMLS = {
     "header": ("[" + "a" * 3_000_000 + "]\nb = 1", "is not known"),
     "comments": ("# x\n" * 2_000_000, "longer than 4 MB"),
     "key": ("a" * 3_000_000 + " = 1", "is not known"),
-    "zero": ("tare_kg = 0", "positive"),
-    "tiny": ("tare_kg = 1e-299", "between 10 and 1e+06 kg"),
+    "zero": ("tare_kg = 0", "car.toml 2 tare_kg 0.0"),
+    "tiny": ("tare_kg = 1e-299", "car.toml tare_kg 1e-299 10 1e+06"),
 }
 
 
@@ -126,7 +125,8 @@ def test_decorated_comments_and_long_lists_are_no_keys(tmp_path):
     ],
 )  # fmt: skip
 def test_numbers_that_no_vehicle_has(build, values):
-    with pytest.raises(ConfigError, match=r"must be"):
+    name = next(iter(values))
+    with error(ConfigError, {"gearings": "gearing", "mapping": r"a\x00b"}.get(name, name)):
         build(**values)
 
 
@@ -206,7 +206,7 @@ def test_a_column_of_category_names_is_refused(tmp_path):
     frame.with_columns(pl.col("vehicle_speed_kmh").cast(pl.Categorical)).write_parquet(
         tmp_path / "obd.parquet"
     )
-    with pytest.raises(DriveError, match="holds text such as 'fast'"):
+    with error(DriveError, "obd.parquet vehicle_speed_kmh fast 1"):
         read_drive(tmp_path / "obd.parquet")
 
 
@@ -258,11 +258,10 @@ def test_names_of_three_hundred_bytes(refused, tmp_path, monkeypatch, words):
 
 @pytest.mark.parametrize("option", ["--vehicle", "--mapping", "--dbc"])
 def test_folders_and_devices_in_place_of_files(refused, tmp_path, option):
-    said = "is a folder" if option == "--dbc" else "Is a directory"
-    refused("inspect", GOLDEN / "csv", option, tmp_path, said=said)
-    refused("inspect", GOLDEN / "csv", option, "/dev/zero", said="is a device or a pipe")
+    refused("inspect", GOLDEN / "csv", option, tmp_path, said=tmp_path)
+    refused("inspect", GOLDEN / "csv", option, "/dev/zero", said="/dev/zero")
     os.mkfifo(tmp_path / "pipe")
-    refused("inspect", GOLDEN / "csv", option, tmp_path / "pipe", said="is a device or a pipe")
+    refused("inspect", GOLDEN / "csv", option, tmp_path / "pipe", said=tmp_path / "pipe")
 
 
 @pytest.mark.parametrize("name", ["drive.toml", "gnss.csv"])
@@ -276,7 +275,7 @@ def test_what_is_no_file_in_place_of_a_table(refused, tmp_path, name, what):
         os.mkfifo(folder / name)
     else:
         (folder / name).symlink_to("/dev/zero" if what == "device" else "nowhere")
-    refused("inspect", folder, said="is no file" if name == "drive.toml" else "a table is one file")
+    refused("inspect", folder, said=folder / name)
 
 
 def test_a_mark_of_the_byte_order_is_no_fault(tmp_path):
@@ -292,15 +291,15 @@ def test_loops_devices_and_what_is_no_file(refused, tmp_path):
     car.write_text("[vehicle]\n")
     refused("inspect", tmp_path / "loop", said="symbolic links")
     refused("inspect", tmp_path / "file" / "x", said="Not a directory")
-    refused("inspect", tmp_path / "pipe.csv", said="a device or a pipe")
-    refused("inspect", "/dev/zero", said="a device or a pipe")
-    refused("weigh", GOLDEN / "csv", "--vehicle", "/dev/zero", said="is a device or a pipe")
-    refused("vehicle", "show", tmp_path / "pipe.csv", said="is a device or a pipe")
+    refused("inspect", tmp_path / "pipe.csv", said=tmp_path / "pipe.csv")
+    refused("inspect", "/dev/zero", said="/dev/zero")
+    refused("weigh", GOLDEN / "csv", "--vehicle", "/dev/zero", said="/dev/zero")
+    refused("vehicle", "show", tmp_path / "pipe.csv", said="pipe.csv")
     words = ("weigh", GOLDEN / "csv", "--vehicle", car, "--json")
-    refused(*words, tmp_path / "file" / "x", said="there is no folder")
+    refused(*words, tmp_path / "file" / "x", said=tmp_path / "file" / "x")
     refused("convert", GOLDEN / "csv", tmp_path / "file" / "x", said="Not a directory")
-    refused("convert", GOLDEN / "csv", tmp_path / "loop", said="exists already")
-    refused("convert", GOLDEN / "csv", tmp_path / "loop", "--force", said="cannot be written")
+    refused("convert", GOLDEN / "csv", tmp_path / "loop", said=tmp_path / "loop")
+    refused("convert", GOLDEN / "csv", tmp_path / "loop", "--force", said="loop")
 
 
 @pytest.mark.parametrize(

@@ -6,9 +6,10 @@ from pathlib import Path
 
 import polars as pl
 import pytest
+from tests.noted import error, named
 
+from weighbridge import ConfigError
 from weighbridge.cli.results import Result, asked_for, inputs, refuse_folder, refuse_results
-from weighbridge.errors import ConfigError
 
 GOLDEN = Path(__file__).parent.parent / "golden"
 VEHICLE = "[vehicle]\nname = 'x'\n"
@@ -37,12 +38,12 @@ def refused(ran, *words):
     assert ran.out == ""
     assert ran.err.count("\n") == 1
     for word in words:
-        assert word in ran.err
+        assert named(ran.err, word)
 
 
 def test_convert_into_the_folder_of_its_table(weighbridge, drive):
     before = contents(drive)
-    refused(weighbridge("convert", drive / "imu.csv", drive, "--force"), "holds imu.csv")
+    refused(weighbridge("convert", drive / "imu.csv", drive, "--force"), "imu.csv")
     assert contents(drive) == before
 
 
@@ -52,9 +53,9 @@ def test_convert_of_links_to_the_tables_of_the_target(weighbridge, drive, tmp_pa
     for file in drive.iterdir():
         (linked / file.name).symlink_to(file)
     before = contents(drive)
-    refused(weighbridge("convert", linked, drive, "--force"), "an input")
+    refused(weighbridge("convert", linked, drive, "--force"), linked / "drive.toml")
     (tmp_path / "log.csv").symlink_to(drive / "imu.csv")
-    refused(weighbridge("convert", tmp_path / "log.csv", drive, "--force"), "which is read")
+    refused(weighbridge("convert", tmp_path / "log.csv", drive, "--force"), "log.csv")
     assert contents(drive) == before
 
 
@@ -63,7 +64,7 @@ def test_convert_onto_its_own_log_by_another_name(weighbridge, tmp_path):
     os.link(log, tmp_path / "same.mf4")
     before = contents(log)
     for name in ("log.mf4", "same.mf4"):
-        refused(weighbridge("convert", log, tmp_path / name, "--force"), "the drive itself")
+        refused(weighbridge("convert", log, tmp_path / name, "--force"), tmp_path / name)
     assert contents(log) == before
 
 
@@ -84,7 +85,7 @@ def test_convert_keeps_the_folder_s_other_files(weighbridge, drive, tmp_path):
 def test_convert_over_what_is_no_mf4(weighbridge, drive, tmp_path):
     notes = tmp_path / "notes.mf4"
     notes.write_text("mine")
-    refused(weighbridge("convert", drive, notes, "--force"), "is no MF4")
+    refused(weighbridge("convert", drive, notes, "--force"), "notes.mf4 MF4 OUT")
     assert notes.read_text() == "mine"
     refused(weighbridge("convert", drive, tmp_path / "notes", "--force", "--dbc", "x"), "x")
 
@@ -103,7 +104,7 @@ def test_calibrate_over_another_drive_s_table(weighbridge, drive, tmp_path):
     before = contents(other)
     for name in ("imu.csv", "drive.toml"):
         ran = weighbridge("calibrate", drive, "-o", other / name, "--mass", "1500", "--force")
-        refused(ran, "is no vehicle file")
+        refused(ran, other / name, "--output")
     assert contents(other) == before
 
 
@@ -111,20 +112,30 @@ def test_calibrate_over_another_drive_s_table(weighbridge, drive, tmp_path):
 def test_reports_over_a_vehicle_file(weighbridge, car, command):
     if command[0] == "reproduce":
         car = car.rename(car.with_stem("car-galvao"))
-        refused(weighbridge(*command, car.with_stem("car")), "is no report")
+        refused(weighbridge(*command, car.with_stem("car")), "car-galvao.toml --report")
     else:
-        refused(weighbridge(*command, car), "is no report")
+        refused(weighbridge(*command, car), "car.toml --output")
     assert car.read_text() == VEHICLE
 
 
 def test_simulate_onto_a_file(weighbridge, car):
-    refused(weighbridge("simulate", "car-short", "-o", car, "--force"), "is a file")
+    refused(weighbridge("simulate", "car-short", "-o", car, "--force"), "car.toml .mf4")
     assert car.read_text() == VEHICLE
 
 
-@pytest.mark.parametrize("how", ["same", "hard", "soft"])
-@pytest.mark.parametrize("what", ["vehicle", "mapping", "dbc", "bus dbc", "mapped dbc", "table"])
-@pytest.mark.parametrize("option", ["--json", "--report", "--track"])
+INPUTS = ("vehicle", "mapping", "dbc", "bus dbc", "mapped dbc", "table")
+HOWS = ("same", "hard", "soft")
+
+
+# Each pair of input, name and option once.
+@pytest.mark.parametrize(
+    ("how", "what", "option"),
+    [
+        (how, what, ("--json", "--report", "--track")[(h + k) % 3])
+        for h, how in enumerate(HOWS)
+        for k, what in enumerate(INPUTS)
+    ],
+)
 def test_results_over_inputs_by_any_name(weighbridge, drive, car, tmp_path, how, what, option):
     mapping = tmp_path / "map.toml"
     names = "dbc = '1:bus.dbc'\n" if what == "mapped dbc" else ""
@@ -160,15 +171,15 @@ def test_the_mapping_a_vehicle_file_names(weighbridge, drive, car, tmp_path):
 def test_two_results_in_one_file(weighbridge, drive, car, tmp_path):
     out = tmp_path / "x"
     words = ("weigh", drive, "--vehicle", car, "--json", out, "--report")
-    refused(weighbridge(*words, out), "--report and --json name the same file")
-    refused(weighbridge(*words, tmp_path / "sub" / ".." / "x"), "no folder")
+    refused(weighbridge(*words, out), "--report --json", out)
+    refused(weighbridge(*words, tmp_path / "sub" / ".." / "x"), tmp_path / "sub" / "..")
     (tmp_path / "sub").mkdir()
-    refused(weighbridge(*words, tmp_path / "sub" / ".." / "x"), "name the same file")
+    refused(weighbridge(*words, tmp_path / "sub" / ".." / "x"), "--report --json")
     (tmp_path / "y").symlink_to("x")
-    refused(weighbridge(*words, tmp_path / "y"), "name the same file")
+    refused(weighbridge(*words, tmp_path / "y"), "--report --json")
     out.write_text("")
     os.link(out, tmp_path / "z")
-    refused(weighbridge(*words, tmp_path / "z"), "name the same file")
+    refused(weighbridge(*words, tmp_path / "z"), "--report --json")
 
 
 def test_earlier_results_of_the_same_kind_are_replaced(tmp_path):
@@ -182,7 +193,7 @@ def test_earlier_results_of_the_same_kind_are_replaced(tmp_path):
             refuse_results(inputs(), [Result("-o", path, kind)])
         for other in {*texts, "notes"} - {text}:
             path.write_text(other)
-            with pytest.raises(ConfigError, match=f"is there already and is no {kind}"):
+            with error(ConfigError, name, kind, "-o"):
                 refuse_results(inputs(), [Result("-o", path, kind)])
     for name in ("t.csv", "t.parquet"):
         path = tmp_path / name
@@ -192,7 +203,7 @@ def test_earlier_results_of_the_same_kind_are_replaced(tmp_path):
             if own:
                 refuse_results(inputs(), results)
             else:
-                with pytest.raises(ConfigError, match="is no track"):
+                with error(ConfigError, name, "--track"):
                     refuse_results(inputs(), results)
 
 
@@ -203,7 +214,7 @@ def test_devices_and_new_files_are_free(drive, car, tmp_path):
     refuse_results(read, asked_for(track=drive / "new.csv", report=tmp_path / "a", json="-"))
     refuse_folder(read, tmp_path / "new")
     refuse_folder(read, drive / "sub")
-    with pytest.raises(ConfigError, match="the drive itself"):
+    with error(ConfigError, "drive"):
         refuse_folder(read, drive)
 
 
@@ -212,15 +223,13 @@ def test_results_that_would_be_tables(weighbridge, drive, car, tmp_path):
     words = ("weigh", drive, "--vehicle", car, "--track")
     (tmp_path / "link.csv").symlink_to(drive / "ride.csv")
     for out in (drive / "ride.csv", drive / "imu.parquet", tmp_path / "link.csv"):
-        refused(weighbridge(*words, out), "would be read as a table")
+        refused(weighbridge(*words, out), out)
     assert contents(drive) == before
     logs = tmp_path / "logs"
     logs.mkdir()
     shutil.copy(GOLDEN / "can.blf", logs)
-    refused(
-        weighbridge("weigh", logs, "--vehicle", car, "--track", logs / "track.csv"),
-        "would be read as a table",
-    )
+    track = logs / "track.csv"
+    refused(weighbridge("weigh", logs, "--vehicle", car, "--track", track), track)
 
 
 def test_times_beside_an_array_are_inputs(tmp_path):

@@ -9,11 +9,11 @@ import numpy as np
 import polars as pl
 import pytest
 import typer
-from tests.noted import noted, says
+from tests.noted import error, noted, says
 from typer.testing import CliRunner
 
+from weighbridge import DriveError
 from weighbridge.cli.inspect import inspect
-from weighbridge.errors import DriveError
 
 GOLDEN = Path(__file__).resolve().parents[1] / "golden"
 
@@ -80,7 +80,7 @@ def test_every_way_on_request(run):
 
 
 def test_what_cannot_be_read_is_one_error(run, tmp_path):
-    with pytest.raises(DriveError, match="no such file"):
+    with error(DriveError, "nowhere"):
         run(tmp_path / "nowhere")
 
 
@@ -100,11 +100,9 @@ def test_one_sample_has_no_rate(run, tmp_path):
 def test_brackets_stay_in_tables_of_several_drives():
     from rich.console import Console
 
+    from weighbridge import Drive, Status, Vehicle
     from weighbridge.cli.weigh import method_table, result_table
-    from weighbridge.estimators import Status
     from weighbridge.pipeline.weighing import without_mass
-    from weighbridge.signals import Drive
-    from weighbridge.vehicle.model import Vehicle
 
     why = "state it under [torque] of the vehicle file"
     car = Vehicle()
@@ -130,9 +128,8 @@ def test_the_next_command_stands_at_the_end(run, weighbridge, loaded, car):
 def test_a_narrow_terminal_shows_whole_numbers():
     from rich.console import Console
 
+    from weighbridge import inspect_drive, read_drive
     from weighbridge.cli.inspect import _signal_table
-    from weighbridge.io import read_drive
-    from weighbridge.pipeline.inspection import inspect_drive
 
     found = inspect_drive(read_drive(GOLDEN / "csv"))
     for width in (60, 80, 140):
@@ -145,10 +142,8 @@ def test_a_narrow_terminal_shows_whole_numbers():
 
 
 def test_a_log_with_a_retarder_leads_to_a_truck_file():
+    from weighbridge import Signal, inspect_drive, read_drive
     from weighbridge.cli.inspect import _Given, _next
-    from weighbridge.io import read_drive
-    from weighbridge.pipeline.inspection import inspect_drive
-    from weighbridge.signals import Signal
 
     time = np.arange(3.0)
     drive = read_drive(GOLDEN / "csv")
@@ -169,8 +164,7 @@ def test_a_log_with_a_retarder_leads_to_a_truck_file():
 @pytest.fixture
 def percent_drive(loaded):
     """A drive of a truck that tells its torque in percent, and nothing else of it."""
-    from weighbridge.io import read_drive
-    from weighbridge.signals import Signal
+    from weighbridge import Signal, read_drive
 
     drive = read_drive(loaded.folder)
     load = drive.signals["engine_load"]
@@ -182,8 +176,8 @@ def percent_drive(loaded):
 
 
 def next_lines(drive, vehicle=None):
+    from weighbridge import inspect_drive
     from weighbridge.cli.inspect import _Given, _next
-    from weighbridge.pipeline.inspection import inspect_drive
 
     found = replace(inspect_drive(drive, vehicle), problems=())
     path = Path("truck.toml") if vehicle is not None else None
@@ -211,7 +205,7 @@ def test_percent_torque_without_its_reference_is_what_is_nearest(percent_drive):
 
 
 def test_the_torque_in_percent_goes_into_the_next_command(percent_drive):
-    from weighbridge.signals import Signal
+    from weighbridge import Signal
     from weighbridge.vehicle.known import Known, describe
 
     reference = Signal("reference_torque", np.array([percent_drive.start]), np.array([1800.0]))
@@ -229,9 +223,9 @@ def test_the_torque_in_percent_goes_into_the_next_command(percent_drive):
 
 
 def test_warnings_of_several_drives_are_a_few_lines():
+    from weighbridge import Drive, Problem
     from weighbridge.cli.weigh import result_table, warning_lines
     from weighbridge.pipeline.weighing import without_mass
-    from weighbridge.signals import Drive, Problem
     from weighbridge.vehicle.known import Known, describe
 
     def day(k, *warnings):

@@ -10,8 +10,9 @@ import threading
 from contextlib import contextmanager
 
 import pytest
+from tests.noted import named
 
-from weighbridge.io import read_drive
+from weighbridge import read_drive
 
 
 @contextmanager
@@ -80,7 +81,7 @@ def test_samples_of_a_source_become_a_drive(weighbridge, tmp_path):
     assert 9.0 < drive.signals["vehicle_speed"].values.mean() < 11.0
     assert drive.info.start_time is not None
     assert again.code == 2
-    assert "not empty, and a recording replaces nothing" in again.err
+    assert named(again.err, tmp_path / "drive")
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
@@ -103,8 +104,8 @@ def test_a_signal_ends_the_recording_and_the_drive_is_whole(tmp_path, number):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("--source", "telepathy:x"), "no known kind"),
-        (("--source", "obd:virtual:a", "--listen-only"), "cannot listen only"),
+        (("--source", "telepathy:x"), "telepathy:x gpsd"),
+        (("--source", "obd:virtual:a", "--listen-only"), "obd:virtual:a --listen-only"),
         ((), "--source"),
     ],
 )
@@ -113,13 +114,13 @@ def test_sources_that_cannot_be_are_refused_and_no_folder_is_made(
 ):
     ran = weighbridge("record", *words, "-o", tmp_path / "drive")
     assert ran.code == 2
-    assert said in ran.err
+    assert named(ran.err, said)
     assert not (tmp_path / "drive").exists()
 
 
 @pytest.mark.parametrize(
     ("check", "says"),
-    [("0.3", "no sample came within 0.3 s (lines:udp:"), ("0", "nothing was recorded")],
+    [("0.3", "0.3 --check"), ("0", "drive")],
 )
 def test_a_source_that_says_nothing_is_told(weighbridge, tmp_path, check, says):
     words = ("--check", check, "--duration", "0.3")
@@ -128,8 +129,7 @@ def test_a_source_that_says_nothing_is_told(weighbridge, tmp_path, check, says):
         port = free.getsockname()[1]
     ran = weighbridge("record", "--source", f"lines:udp:{port}", *words, "-o", tmp_path / "drive")
     assert ran.code == 2
-    assert says in ran.err
-    assert len(ran.err.splitlines()) == 1
+    assert named(ran.err, says)
     assert not (tmp_path / "drive").exists()
 
 
@@ -140,6 +140,6 @@ def test_a_source_that_is_out_of_reach_ends_it(weighbridge, tmp_path):
     words = ("--source", f"elm:tcp:127.0.0.1:{port}", "--check", "0.5", "-o", tmp_path / "drive")
     ran = weighbridge("record", *words)
     assert ran.code == 2
-    assert "cannot be reached" in ran.err.splitlines()[-1]
+    assert named(ran.err.splitlines()[-1], f"elm:tcp:127.0.0.1:{port} 0.5 --check")
     assert "Traceback" not in ran.err
     assert not (tmp_path / "drive").exists()

@@ -4,8 +4,9 @@ import json
 
 import pytest
 from tests.graded import AREA, CAR, climb, coasting
+from tests.noted import named
 
-from weighbridge.io.write import write_drive
+from weighbridge.io import write_drive
 
 MASS, POWER = 1400.0, 60.0
 
@@ -60,13 +61,12 @@ def test_a_drive_downhill_is_not_bounded(weighbridge, car, tmp_path):
 
 @pytest.mark.parametrize(
     ("words", "told"),
-    [(("--power", 0), "power must be a positive number"), ((), "--power")],
+    [(("--power", 0), "0.0"), ((), "--power")],
 )
 def test_a_power_that_is_none_is_one_line(weighbridge, hill, car, words, told):
     done = weighbridge("bound", hill, "--vehicle", car, *words)
     assert done.code == 2
-    assert told in done.err
-    assert len(done.err.splitlines()) == 1
+    assert named(done.err, told)
 
 
 def test_coasting_both_ways_tells_drag_over_mass(weighbridge, car, tmp_path):
@@ -93,5 +93,4 @@ def test_coasting_both_ways_tells_drag_over_mass(weighbridge, car, tmp_path):
 def test_a_span_that_is_none_is_one_line(weighbridge, hill, span):
     done = weighbridge("coast", hill, "--there", span, "--back", "90:120")
     assert done.code == 2
-    assert f"--there {span}: give two instants in seconds" in done.err
-    assert len(done.err.splitlines()) == 1
+    assert named(done.err, "--there", span)

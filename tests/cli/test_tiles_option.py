@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+from tests.noted import named
+
 GOLDEN = Path(__file__).parent.parent / "golden"
 SERVER = "https://tiles.example.org/{z}/{x}/{y}.png"
 
@@ -11,10 +13,12 @@ def test_tiles_need_a_report_and_an_address(weighbridge, tmp_path):
     car.write_text("[vehicle]\n[mounting]\nroll_deg = 0\npitch_deg = 0\nyaw_deg = 0\n")
     words = ("weigh", GOLDEN / "csv", "--vehicle", car)
     ran = weighbridge(*words, "--tiles", SERVER)
-    assert (ran.code, "name it with --report" in ran.err) == (2, True)
+    assert ran.code == 2
+    assert named(ran.err, "--tiles --report")
     page = tmp_path / "r.html"
     ran = weighbridge(*words, "--report", page, "--tiles", "tiles.example.org")
-    assert (ran.code, "is no address of map tiles" in ran.err) == (2, True)
+    assert ran.code == 2
+    assert named(ran.err, "tiles.example.org {z} {x} {y}")
     assert not page.exists()
     ran = weighbridge(*words, "--report", page, "--tiles", SERVER)
     assert ran.code == 1

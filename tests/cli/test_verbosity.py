@@ -11,6 +11,7 @@ import pytest
 import typer
 from tests.cli.conftest import TERMINAL, written_to
 from tests.cli.test_terminal import RUN
+from tests.noted import named
 
 from weighbridge.cli.main import app
 from weighbridge.cli.progress import Bar, compiling, time_text
@@ -52,7 +53,9 @@ def test_quiet_leaves_the_results(weighbridge, loaded, car, tmp_path):
 
 
 def test_quiet_leaves_errors(weighbridge, car):
-    assert "no such file" in weighbridge("weigh", "none", "--vehicle", car, "--quiet").err
+    ran = weighbridge("weigh", "none", "--vehicle", car, "--quiet")
+    assert ran.code == 2
+    assert named(ran.err, "none")
 
 
 def test_verbose_logs_each_drive_and_twice_each_stage(weighbridge, loaded, car):

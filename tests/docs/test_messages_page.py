@@ -9,8 +9,8 @@ import pytest
 from website.messages import messages_page
 
 import weighbridge
+from weighbridge import Status
 from weighbridge.balance import REASON_TEXT, Reason
-from weighbridge.estimators import Status
 from weighbridge.messages import catalogue
 
 HOME = Path(__file__).parents[2]

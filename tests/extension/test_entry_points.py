@@ -6,7 +6,7 @@ import pytest
 from tests.recipes import code, entry_points
 
 import weighbridge as wb
-from weighbridge.errors import ConfigError
+from weighbridge import ConfigError
 from weighbridge.estimators import ESTIMATORS
 from weighbridge.simulation import make_scenario, simulate_car
 from weighbridge.vehicle.classes import VEHICLE_CLASSES

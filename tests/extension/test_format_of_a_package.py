@@ -4,10 +4,10 @@ import sys
 
 import pytest
 from numpy.testing import assert_allclose
+from tests.noted import error
 from tests.recipes import code, entry_points
 
-from weighbridge.errors import DriveError
-from weighbridge.io import read_drive
+from weighbridge import DriveError, read_drive
 from weighbridge.io.formats import formats
 
 READER = code("bang_logs.py")
@@ -56,7 +56,7 @@ def test_an_installed_package_adds_a_format(install, log):
 
 def test_a_signal_that_no_drive_can_hold_is_refused(install, log):
     install(READER.replace('"vehicle_speed"', '"motor_iq"'))
-    with pytest.raises(DriveError, match="reader of Bang hands over 'motor_iq'"):
+    with error(DriveError, "Bang motor_iq"):
         read_drive(log)
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import polars as pl
 
-from weighbridge.io.write import write_drive
+from weighbridge.io import write_drive
 from weighbridge.vehicle.known import Known, describe
 
 # What differs between two runs of the same drive.

@@ -6,7 +6,8 @@ import pytest
 
 import weighbridge as wb
 from tests.fleet.fleets import compared, tiny_fleet
-from weighbridge.errors import ConfigError
+from tests.noted import error
+from weighbridge import ConfigError
 from weighbridge.fleet.bucket import Bucket, brought, kept_at, place_of_results
 from weighbridge.fleet.job import weigh_job
 from weighbridge.fleet.run import FleetSettings, prepared
@@ -142,21 +143,21 @@ def test_a_run_that_another_overtook_says_so(machine, fleet):
                 weigh_job(job)
         machine("second")
         run(*fleet)
-        with pytest.raises(ConfigError, match="wrote there meanwhile"):
+        with error(ConfigError, "memory://bucket/results"):
             results.send()
     assert rows().height == 6
 
 
 def test_places_that_cannot_be(machine, fleet):
     fsspec.filesystem("memory").pipe("/bucket/other/notes.txt", b"mine")
-    with pytest.raises(ConfigError, match="holds no results"):
+    with error(ConfigError, "memory://bucket/other"):
         run(*fleet, "memory://bucket/other")
-    with pytest.raises(ConfigError, match="holds no results"):
+    with error(ConfigError, "memory://bucket/nothing"):
         brought("memory://bucket/nothing")
-    with pytest.raises(ConfigError, match="do not see the folder"):
+    with error(ConfigError, URL, "tcp://10.0.0.5:8786"):
         wb.fleet.weigh_drives(*fleet, URL, scheduler="tcp://10.0.0.5:8786")
     with (
         place_of_results(URL).locked(),
-        pytest.raises(ConfigError, match="another run"),
+        error(ConfigError, URL),
     ):
         run(*fleet)

@@ -8,10 +8,12 @@ import pytest
 from scipy.stats import t as student
 
 from tests.fleet.made_rows import drive, frames, segment
-from weighbridge.errors import ConfigError
+from tests.noted import error
+from weighbridge import ConfigError
+from weighbridge.fleet import Limits, speed_mass
 from weighbridge.fleet.couplings import Coupling, read_couplings
-from weighbridge.fleet.figures import per_vehicle, quality, rfms, speed_mass, totals
-from weighbridge.fleet.legs import Limits, legs, load_changes
+from weighbridge.fleet.figures import per_vehicle, quality, rfms, totals
+from weighbridge.fleet.legs import legs, load_changes
 from weighbridge.fleet.protocol import known_masses, outside, verdicts
 from weighbridge.fleet.schema import LEGS
 from weighbridge.fleet.tickets import Ticket
@@ -97,15 +99,15 @@ def test_a_table_of_couplings_is_read_and_its_mistakes_are_told(tmp_path):
     assert found.start == datetime(2026, 5, 4, 7, tzinfo=UTC)
     assert found.end.year == 9999
     for row, told in (
-        ("truck1,noon,,28000", "must be dates and times"),
-        ("truck1,2026-05-04T07:00:00,2026-05-04T06:00:00,28000", "is not after"),
-        ("truck1,2026-05-04T07:00:00,,28", "no permitted mass"),
+        ("truck1,noon,,28000", "noon"),
+        ("truck1,2026-05-04T07:00:00,2026-05-04T06:00:00,28000", "2026-05-04T06:00:00"),
+        ("truck1,2026-05-04T07:00:00,,28", "28"),
     ):
         path.write_text(head + row + "\n")
-        with pytest.raises(ConfigError, match=f"row 2: .*{told}"):
+        with error(ConfigError, "couplings.csv row 2", told):
             read_couplings(path)
     path.write_text("vehicle,start\n")
-    with pytest.raises(ConfigError, match="lacks the column end"):
+    with error(ConfigError, "couplings.csv end"):
         read_couplings(path)
 
 
@@ -230,7 +232,7 @@ def test_distance_by_speed_and_mass():
         (40.0, None, 4.0, pytest.approx(1 / 12)),
     ]
     assert speed_mass(*frames(rows, told), by_vehicle=True)["vehicle_id"].n_unique() == 2
-    with pytest.raises(ConfigError, match="rise from 0"):
+    with error(ConfigError, "speeds 10.0 20.0"):
         speed_mass(*frames(rows, told), speeds=(10.0, 20.0))
 
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import weighbridge as wb
-from weighbridge.fleet import read_drives, read_segments
+from weighbridge.fleet import read_drives, read_segments, speed_mass
 from weighbridge.fleet.facts import weighing_row
-from weighbridge.fleet.figures import per_vehicle, speed_mass
+from weighbridge.fleet.figures import per_vehicle
 from weighbridge.fleet.inputs import recordings
 from weighbridge.fleet.job import Job, weigh_job
 from weighbridge.fleet.legs import legs
@@ -17,7 +17,7 @@ from weighbridge.fleet.protocol import known_masses
 from weighbridge.fleet.store import Results
 from weighbridge.fleet.tickets import Ticket, ticketed
 from weighbridge.fleet.vehicles import Vehicles
-from weighbridge.io.write import write_drive
+from weighbridge.io import write_drive
 from weighbridge.simulation import make_scenario, simulate_car
 
 START = "2026-05-04T06:00:00+00:00"

@@ -12,7 +12,8 @@ import pytest
 
 import weighbridge as wb
 from tests.fleet.fleets import real_fleet, tiny_drive
-from weighbridge.errors import ConfigError
+from tests.noted import error, named
+from weighbridge import ConfigError
 from weighbridge.fleet.learning import (
     MOST,
     Drift,
@@ -100,14 +101,14 @@ def test_a_vehicle_that_kills_its_worker_loses_nothing_of_the_others(
 def test_learning_never_writes_over_what_is_read(tiny, tmp_path, scheduler):
     drives, cars = tiny
     tickets = tickets_at(tmp_path / "t.csv")
-    with pytest.raises(ConfigError, match="holds the vehicle files that are read"):
+    with error(ConfigError, "vehicles --learn"):
         wb.fleet.weigh_drives(drives, cars, tmp_path / "r", learn=cars, tickets=tickets)
     other = tmp_path / "other"
     other.mkdir()
     (other / "van1.toml").write_text("[letter]\ndear = 1\n")
     with pytest.raises(ConfigError, match=r"van1\.toml"):
         wb.fleet.weigh_drives(drives, cars, tmp_path / "r", learn=other, tickets=tickets)
-    with pytest.raises(ConfigError, match="give both"):
+    with error(ConfigError, "--learn --tickets"):
         wb.fleet.weigh_drives(drives, cars, tmp_path / "r", tickets=tickets)
 
 
@@ -150,15 +151,15 @@ def test_the_ticket_of_a_drive_in_which_the_load_changed_is_of_no_neighbour():
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        ("vehicle,time\nvan,2026-05-01\n", "lacks the column mass_kg"),
-        ("vehicle,time,mass_kg\nvan,noon,3000\n", "row 2: time 'noon'"),
-        ("vehicle,time,mass_kg\nvan,2026-05-01,3\n", "no vehicle's mass"),
+        ("vehicle,time\nvan,2026-05-01\n", "tickets.csv vehicle time mass_kg"),
+        ("vehicle,time,mass_kg\nvan,noon,3000\n", "tickets.csv row 2 noon 3000"),
+        ("vehicle,time,mass_kg\nvan,2026-05-01,3\n", "tickets.csv row 2 van 3 kg"),
     ],
 )
 def test_impossible_tickets_are_told(tmp_path, text, told):
     path = tmp_path / "tickets.csv"
     path.write_text(text)
-    with pytest.raises(ConfigError, match=told):
+    with error(ConfigError, told):
         read_tickets(path)
 
 
@@ -215,4 +216,4 @@ def test_raw_logs_are_learnt_from_with_the_databases_of_the_fleet(tmp_path, shor
     lesson = Lesson(assigned=car, drives=(known,), output=str(tmp_path))
     assert "engine_torque" in learn_vehicle(lesson)["told"]
     lost = learn_vehicle(replace(lesson, dbc=(str(tmp_path / "lost.dbc"),)))["told"]
-    assert "lost.dbc: no such file" in lost
+    assert named(lost, "can.log --dbc lost.dbc")

@@ -10,9 +10,9 @@ import polars as pl
 import pytest
 
 from tests.fleet.made_rows import drive, segment
+from weighbridge.fleet import read_drives, read_segments
 from weighbridge.fleet.kept import keep_legs
 from weighbridge.fleet.legs import legs
-from weighbridge.fleet.reading import read_drives, read_segments
 from weighbridge.fleet.schema import DRIVES, LEGS, PART, SEGMENTS
 from weighbridge.fleet.store import Results, write_part
 

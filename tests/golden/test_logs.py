@@ -8,8 +8,8 @@ from make_logs import truth
 from numpy.testing import assert_allclose
 from tests.noted import has
 
-from weighbridge.io import read_drive
-from weighbridge.io.mdf import draft
+from weighbridge import read_drive
+from weighbridge.io.formats import format_of
 
 HERE = Path(__file__).parent
 
@@ -87,4 +87,5 @@ def test_formats_of_one_drive_can_be_joined():
 
 
 def test_a_draft_tells_the_rate_of_each_clock():
-    assert {column.rate for column in draft(HERE / "log.mf4").columns} == {4.0, 50.0}
+    path = HERE / "log.mf4"
+    assert {column.rate for column in format_of(path).draft(path).columns} == {4.0, 50.0}

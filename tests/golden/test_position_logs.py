@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from numpy.testing import assert_allclose
 
-from weighbridge.io import read_drive
+from weighbridge import read_drive
 
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE))

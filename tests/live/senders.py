@@ -8,7 +8,7 @@ from weighbridge.live.emulator.lines import InertialLines
 from weighbridge.live.emulator.sentences import Sentences
 from weighbridge.live.sources.lines import LineReader
 from weighbridge.live.sources.nmea import SentenceReader
-from weighbridge.signals.catalogue import QUANTITIES
+from weighbridge.signals import QUANTITIES
 
 TICK = 0.05
 """What came is handed over so often [s]."""

@@ -5,9 +5,8 @@ from statistics import NormalDist
 import numpy as np
 import pytest
 
-from weighbridge.errors import ConfigError
+from weighbridge import ConfigError, LiveStatus, LiveWeighing
 from weighbridge.live.alerts import Alert
-from weighbridge.live.weighing import LiveStatus, LiveWeighing
 
 
 def weighing(mass, std=50.0, status=LiveStatus.WEIGHED):

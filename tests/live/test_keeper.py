@@ -7,12 +7,13 @@ import time
 import pytest
 
 import weighbridge as wb
+from tests.noted import named
+from weighbridge import DriveInfo, Vehicle
 from weighbridge.estimators.judging import STOP
 from weighbridge.live import clock
 from weighbridge.live.keeper import Keeper
-from weighbridge.signals import DriveInfo
 from weighbridge.signals.recent import BEHIND, STEP
-from weighbridge.vehicle.model import Driveline, Vehicle
+from weighbridge.vehicle.model import Driveline
 
 
 @pytest.fixture(scope="module")
@@ -145,7 +146,7 @@ def test_a_state_of_another_vehicle_is_set_aside(car, tmp_path):
     path = tmp_path / "car.state"
     Keeper(path).write(wb.LiveScale(replace(car, tare=1400.0)))
     _, said = restored(Keeper(path), car)
-    assert "another vehicle file" in said
+    assert named(said, path, "car.state.bad")
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root writes everywhere")

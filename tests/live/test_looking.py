@@ -10,12 +10,12 @@ import pytest
 import weighbridge as wb
 from tests.live.test_scale import blocks, even, fed
 from tests.live.test_session import Shown
+from weighbridge import LiveStatus
 from weighbridge.live import looking
 from weighbridge.live.feed import Feed
 from weighbridge.live.outputs import Outputs
 from weighbridge.live.replay import Replay
 from weighbridge.live.session import Session
-from weighbridge.live.weighing import LiveStatus
 from weighbridge.signals.recent import LONGEST_STEP
 
 

@@ -9,8 +9,8 @@ import pytest
 import weighbridge as wb
 from tests.live.senders import HOST, Senders
 from tests.noted import says
+from weighbridge import LiveStatus
 from weighbridge.live.records import Records
-from weighbridge.live.weighing import LiveStatus
 from weighbridge.signals.recent import LONGEST_STEP
 
 

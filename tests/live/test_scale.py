@@ -1,6 +1,7 @@
 """A live scale beside the forward pass of the recorded drive, whatever the way samples come."""
 
 import copy
+import re
 from dataclasses import replace
 from itertools import pairwise
 from typing import NamedTuple
@@ -10,15 +11,14 @@ import pytest
 
 import weighbridge as wb
 from tests.live.conftest import PHONE
+from tests.noted import error
+from weighbridge import ConfigError, LiveStatus
 from weighbridge.balance.averaging import WINDOW
-from weighbridge.errors import ConfigError
 from weighbridge.estimators.judging import STOP
 from weighbridge.live.arrival import health_of
-from weighbridge.live.checkpoint import VERSION
 from weighbridge.live.learning import _nothing
 from weighbridge.live.on_the_move import REST, OnTheMove
 from weighbridge.live.records import LATENESS, Records
-from weighbridge.live.weighing import LiveStatus
 from weighbridge.pipeline.forward import (
     begin,
     forward_weigh,
@@ -306,7 +306,7 @@ def test_a_checkpoint_loses_nothing(short, weighing, forward, half_driven):
     [
         lambda b: b[: len(b) // 2],
         lambda b: b.replace('"d"', '"x"', 1),
-        lambda b: b.replace(f'checkpoint": {VERSION}', 'checkpoint": 99', 1),
+        lambda b: re.sub(r'checkpoint": \d+', 'checkpoint": 99', b, count=1),
         lambda b: "\xff" + b,
         lambda b: "",
     ],
@@ -320,7 +320,7 @@ def test_a_damaged_checkpoint_is_refused(weighing, half_driven, damage):
 
 def test_a_checkpoint_of_another_vehicle_is_refused(weighing, setup):
     saved = wb.LiveScale(weighing.vehicle, setup=setup, info=weighing.drive.info).checkpoint()
-    with pytest.raises(ConfigError, match="another vehicle file"):
+    with error(ConfigError):
         wb.LiveScale.restore(replace(weighing.vehicle, tare=1000.0), saved)
 
 
@@ -376,7 +376,7 @@ def test_unfit_and_late_samples_are_counted(middle, half_driven):
     scale.update(middle + 10.0, "vehicle_speed", float("nan"))
     speed = next(s for s in scale.weighing().signals if s.name == "vehicle_speed")
     assert (speed.late, speed.unfit) == (1, 1)
-    with pytest.raises(ConfigError, match="no signal"):
+    with error(ConfigError, "warp_factor weighbridge.signals.catalogue"):
         scale.update(1.0, "warp_factor", 9.0)
 
 

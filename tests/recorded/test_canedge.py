@@ -9,8 +9,8 @@ import pytest
 from tests.noted import refused
 
 import weighbridge as wb
+from weighbridge import DriveError
 from weighbridge.checks import check_drive
-from weighbridge.errors import DriveError
 from weighbridge.kernels.rotation import euler_to_matrix
 from weighbridge.signals.recent import LONGEST_STEP
 from weighbridge.vehicle.gear import detect_gearings

@@ -5,8 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from weighbridge.io import read_drive
-from weighbridge.signals import Signal
+from weighbridge import Signal, read_drive
 from weighbridge.signals.alignment import align
 
 EXAMPLES = Path(__file__).parents[2] / "examples"

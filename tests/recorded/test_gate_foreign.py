@@ -5,7 +5,7 @@ import polars as pl
 import pytest
 
 import weighbridge as wb
-from weighbridge.errors import WeighbridgeError
+from weighbridge import WeighbridgeError
 
 METHODS = ("joint", "rls", "robust-rls", "ekf", "hybrid")
 

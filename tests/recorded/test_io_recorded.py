@@ -6,10 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from weighbridge import Drive, Signal, read_drive
 from weighbridge.checks import check_drive
 from weighbridge.checks.inertial import _turns
-from weighbridge.io import read_drive
-from weighbridge.signals import Drive, Signal
 
 BMW_MAPPING = Path(__file__).resolve().parents[2] / "examples" / "bmw-i3" / "mapping.toml"
 SEAT_MAPPING = {

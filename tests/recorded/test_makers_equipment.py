@@ -7,7 +7,7 @@ import pytest
 from numba import config
 
 import weighbridge as wb
-from weighbridge.signals import Signal
+from weighbridge import Signal
 
 pytestmark = pytest.mark.skipif(
     bool(config.DISABLE_JIT), reason="whole drives take minutes without the compiler"

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from weighbridge import Vehicle
 from weighbridge.balance import force_balance
 from weighbridge.estimators.considered import (
     fit_consider_std,
@@ -19,7 +20,7 @@ from weighbridge.estimators.joint.slow_errors import design
 from weighbridge.kernels import disturbance as kernel
 from weighbridge.navigation.select import find_motion
 from weighbridge.simulation import MIDSIZE, Scenario, short_route, simulate_car
-from weighbridge.vehicle.model import Driveline, Provenance, RoadLoad, TorqueModel, Vehicle
+from weighbridge.vehicle.model import Driveline, Provenance, RoadLoad, TorqueModel
 
 MASS = 1700.0
 CAR = Vehicle(

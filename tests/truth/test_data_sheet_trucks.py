@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 import weighbridge as wb
+from weighbridge import Vehicle
 from weighbridge.simulation import Sensors, make_scenario, simulate_car
 from weighbridge.vehicle.classes import VEHICLE_CLASSES
-from weighbridge.vehicle.model import Driveline, RoadLoad, TorqueModel, Vehicle
+from weighbridge.vehicle.model import Driveline, RoadLoad, TorqueModel
 
 SEEDS = (61_001, 61_002, 61_003)
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from weighbridge.balance.table import ForceTable
+from weighbridge.balance import ForceTable
 from weighbridge.calibration.inverse import (
     DriveRows,
     FitSettings,

@@ -6,13 +6,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import cumulative_trapezoid, solve_ivp
 from scipy.stats import truncnorm
 
-from weighbridge.inertia.filter import (
-    InertiaFilter,
-    RideSamples,
-    fixed_params,
-    run_filter,
-)
-from weighbridge.inertia.settings import InertiaSettings
+from weighbridge import InertiaFilter, InertiaSettings
+from weighbridge.inertia.filter import RideSamples, fixed_params, run_filter
 from weighbridge.kernels import inertia as kernel
 from weighbridge.kernels import kalman_bucy
 from weighbridge.papers.nguyen2024 import suspension_of

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from weighbridge.balance import law
-from weighbridge.balance.table import ForceTable
+from weighbridge import Vehicle
+from weighbridge.balance import ForceTable, law
 from weighbridge.simulation import MIDSIZE, Effects, Sensors, make_scenario, simulate_car
-from weighbridge.vehicle.model import Driveline, RoadLoad, TorqueModel, Vehicle
+from weighbridge.vehicle.model import Driveline, RoadLoad, TorqueModel
 
 CAR = Vehicle(
     tare=1500.0,

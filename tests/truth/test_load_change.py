@@ -8,12 +8,12 @@ import pytest
 from numba import config
 
 import weighbridge as wb
-from weighbridge.estimators import Status
+from weighbridge import Status, Vehicle
 from weighbridge.estimators.joint.load_stops import change_odds, loadable, stood_before, too_hasty
 from weighbridge.kernels import disturbance
 from weighbridge.kernels import load_change as kernel
 from weighbridge.simulation import Loading, Sensors, make_scenario, simulate_car
-from weighbridge.vehicle.model import Driveline, Vehicle
+from weighbridge.vehicle.model import Driveline
 
 
 def drive(jump, seed=3, n=300, at=150):

@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 from scipy.integrate import quad, solve_ivp
 from scipy.signal import csd, welch
 
-from weighbridge.errors import ConfigError
+from weighbridge import ConfigError
 from weighbridge.simulation.ride import (
     SETTLING,
     TRUCK,

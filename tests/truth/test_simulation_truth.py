@@ -23,12 +23,12 @@ from weighbridge.simulation import (
     flat_route,
     make_scenario,
     mixed_route,
+    simulate_car,
 )
 from weighbridge.simulation.body import simulate_pose
 from weighbridge.simulation.longitudinal import DT, simulate_trajectory
 from weighbridge.simulation.scenario import streams
 from weighbridge.simulation.sensing import simulate_imu
-from weighbridge.simulation.simulate import simulate_car
 
 GRAVITY = 9.81
 SENSOR_ERRORS = (

@@ -7,12 +7,13 @@ import pytest
 from tests.noted import refused
 
 import weighbridge as wb
-from weighbridge.balance.force_balance import force_balance
+from weighbridge import Vehicle
+from weighbridge.balance import force_balance
 from weighbridge.calibration.run import run_calibration
 from weighbridge.navigation.select import find_motion
 from weighbridge.simulation import Sensors, make_scenario, simulate_car
 from weighbridge.vehicle.gear import UNSLIPPED
-from weighbridge.vehicle.model import Driveline, Vehicle
+from weighbridge.vehicle.model import Driveline
 
 
 def drive(payload, seed, name="cvt-calibration"):

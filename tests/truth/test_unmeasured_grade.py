@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from weighbridge import Vehicle
 from weighbridge.constants import GRAVITY
 from weighbridge.estimators import ESTIMATORS, ritter, unmeasured_grade
 from weighbridge.kernels import multiple_forgetting
@@ -22,14 +23,7 @@ from weighbridge.simulation import (
     straight_route,
     usual_polling,
 )
-from weighbridge.vehicle.model import (
-    Driveline,
-    Mounting,
-    Provenance,
-    RoadLoad,
-    TorqueModel,
-    Vehicle,
-)
+from weighbridge.vehicle.model import Driveline, Mounting, Provenance, RoadLoad, TorqueModel
 
 METHODS = ("vahidi-rls", "holm-ekf", "ritter-batch", "fathy-events")
 PAPERS = Effects.only(

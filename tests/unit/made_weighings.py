@@ -6,7 +6,8 @@ from dataclasses import replace
 
 from tests.noted import noted
 
-from weighbridge.live.weighing import LiveStatus, LiveWeighing, SignalHealth
+from weighbridge import LiveStatus, LiveWeighing
+from weighbridge.live.weighing import SignalHealth
 
 NAMES = (
     *(f"accel_{a}" for a in "xyz"), *(f"gyro_{a}" for a in "xyz"), "vehicle_speed",

@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from weighbridge import Signal
 from weighbridge.constants import EARTH_RADIUS
 from weighbridge.io.clocks import settle_clocks
 from weighbridge.io.log import Log
-from weighbridge.signals import Signal
 from weighbridge.signals.alignment import align
 
 

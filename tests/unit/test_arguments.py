@@ -6,16 +6,14 @@ import numpy as np
 import pandas as pd
 import polars as pl
 import pytest
+from tests.noted import error
 
 import weighbridge as wb
-from weighbridge.arguments import choice_fault, near_miss
-from weighbridge.calibration.settings import CalibrationSettings
-from weighbridge.errors import ConfigError
+from weighbridge import CalibrationSettings, ConfigError
 from weighbridge.papers.nguyen2024 import suspension_of
 from weighbridge.signals.units import unit
 from weighbridge.simulation.ride import TRUCK, RideSensors
-from weighbridge.vehicle.driveline import Driveline
-from weighbridge.vehicle.torque_model import TorqueModel
+from weighbridge.vehicle.model import Driveline, TorqueModel
 
 WRONG = (3, 2.5, None, object(), [1, 2], {"a": 1}, b"x", {3}, np.arange(3.0), "\0")
 
@@ -145,33 +143,33 @@ def test_wrong_types_are_one_sentence(calls):
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (lambda car: wb.weigh("x", car, mapping=3), "mapping must be the path of a mapping file"),
-        (lambda car: wb.weigh("x", car, settings=3), "settings must be a dictionary of values"),
-        (lambda _: wb.read_drive(pl.DataFrame({"time_s": [0.0]})), "DataFrame; read_frame reads"),
-        (lambda _: wb.read_drive(pd.DataFrame({"time_s": [0.0]})), "DataFrame; read_frame reads"),
-        (lambda _: wb.read_drive({"imu": pl.DataFrame()}), "got dict; read_frame reads data"),
-        (lambda _: wb.read_drive(3), "path must be a path, as text or pathlib.Path, or a list"),
-        (lambda _: wb.read_drive(["a", 3]), "each path must be a path, .* got 3"),
-        (lambda _: wb.to_frames("x"), "drive must be a drive, as read_drive returns it, got 'x'"),
-        (lambda _: wb.compare(None), "weighing must be what weigh returns, got None"),
-        (lambda _: wb.Vehicle.load(3), "path must be a path"),
-        (lambda _: wb.Signal("gear", ["a"], [1]), "time of signal 'gear' must be numbers"),
-        (lambda _: wb.LiveScale(3), "a vehicle is expected, got int"),
-        (lambda _: wb.DriveInfo(mass="1580"), "mass must be a number, got '1580'"),
-        (lambda _: wb.Vehicle(tare="1580"), "tare must be a number, got '1580'"),
+        (lambda car: wb.weigh("x", car, mapping=3), "3"),
+        (lambda car: wb.weigh("x", car, settings=3), "settings 3"),
+        (lambda _: wb.read_drive(pl.DataFrame({"time_s": [0.0]})), "DataFrame read_frame"),
+        (lambda _: wb.read_drive(pd.DataFrame({"time_s": [0.0]})), "DataFrame read_frame"),
+        (lambda _: wb.read_drive({"imu": pl.DataFrame()}), "dict read_frame"),
+        (lambda _: wb.read_drive(3), "path pathlib.Path 3"),
+        (lambda _: wb.read_drive(["a", 3]), "path 3"),
+        (lambda _: wb.to_frames("x"), "drive read_drive x"),
+        (lambda _: wb.compare(None), "weighing weigh None"),
+        (lambda _: wb.Vehicle.load(3), "path pathlib.Path 3"),
+        (lambda _: wb.Signal("gear", ["a"], [1]), "gear"),
+        (lambda _: wb.LiveScale(3), "int"),
+        (lambda _: wb.DriveInfo(mass="1580"), "mass 1580"),
+        (lambda _: wb.Vehicle(tare="1580"), "tare 1580"),
     ],
 )
 def test_the_sentence_says_what_was_expected(short_car, tmp_path, monkeypatch, call, words):
     (tmp_path / "x").mkdir()
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(wb.ConfigError, match=words) as told:
+    with error(wb.ConfigError, words) as told:
         call(short_car)
     # Code that catches Python's own error goes on to work.
     assert isinstance(told.value, TypeError)
 
 
 def test_a_mass_per_drive_by_name_is_refused(short_drive):
-    with pytest.raises(TypeError, match="mass must be a number of kg, or a list of one for each"):
+    with error(TypeError, "mass dict"):
         wb.calibrate(short_drive.drive, mass={"a": 1580.0})
 
 
@@ -179,7 +177,7 @@ def test_lists_make_a_signal():
     made = wb.Signal("vehicle_speed", [0, 1, 2], [10, 12.5, 13])
     assert made.time.dtype == made.values.dtype == np.float64
     assert made.at([0.5])[0] == 11.25
-    with pytest.raises(wb.ConfigError, match=r"times of shape \(3,\) and values of shape \(2,\)"):
+    with error(wb.ConfigError, "vehicle_speed (3,) (2,)"):
         wb.Signal("vehicle_speed", [0, 1, 2], [10, 12.5])
 
 
@@ -188,12 +186,10 @@ def test_lists_make_a_signal():
     [("trck", "truck"), ("CAR", "car"), ("zeppelin", ""), ("x" * 5000, "")],
 )
 def test_a_word_that_is_nearly_right_is_named(given, meant):
-    known = ("car", "van", "truck")
-    assert near_miss(given, known) == meant
-    fault = choice_fault("class", given, known)
-    assert fault.startswith("class must be car, van or truck, got ")
-    assert fault.endswith(f"; did you mean {meant}?") == bool(meant)
-    assert len(fault) < 120
+    with error(wb.ConfigError, "car van truck") as found:
+        wb.Vehicle(kind=given)
+    assert str(found.value).endswith(f" {meant}?") == bool(meant)
+    assert len(str(found.value)) < 170
 
 
 @pytest.mark.parametrize(

@@ -7,14 +7,14 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from tests.noted import refused
 
+from weighbridge import Drive, DriveInfo, Signal, Vehicle
 from weighbridge.balance import Reason, force_balance
 from weighbridge.balance.gear_fit import share_on_gears
 from weighbridge.balance.instants import WIND_AT_VEHICLE
 from weighbridge.balance.law import drag_force, rotating_mass
 from weighbridge.estimators.rls import estimate
 from weighbridge.navigation.motion import Motion
-from weighbridge.signals import Drive, DriveInfo, Signal
-from weighbridge.vehicle.model import Driveline, RoadLoad, Timing, TorqueModel, Vehicle
+from weighbridge.vehicle.model import Driveline, RoadLoad, Timing, TorqueModel
 
 END = 400.0
 CLOCK = np.arange(0.0, END, 0.1)

@@ -12,17 +12,23 @@ import pytest
 from scipy.spatial.transform import Rotation
 from tests.noted import refused
 
+from weighbridge import (
+    Drive,
+    DriveError,
+    DriveInfo,
+    Signal,
+    Vehicle,
+    inspect_drive,
+    read_drive,
+    weigh,
+)
 from weighbridge.checks import check_drive, correct_drive
 from weighbridge.checks.clocks import check_pauses
 from weighbridge.checks.inertial import check_imu
-from weighbridge.errors import DriveError
-from weighbridge.io import read_drive
 from weighbridge.messages import phrase
-from weighbridge.pipeline.inspection import describe, inspect_drive
-from weighbridge.pipeline.weighing import weigh
-from weighbridge.signals import Drive, DriveInfo, Signal
+from weighbridge.pipeline.inspection import describe
 from weighbridge.signals.units import UNITS
-from weighbridge.vehicle.model import Driveline, TorqueModel, Vehicle
+from weighbridge.vehicle.model import Driveline, TorqueModel
 
 GEARINGS = (45.0, 26.0, 17.5, 13.0, 10.5)
 CAR = Vehicle(

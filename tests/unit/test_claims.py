@@ -6,20 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.noted import error
 
-from weighbridge.errors import ConfigError
+from weighbridge import ConfigError
 from weighbridge.estimators.settings import changed, differences, parsed
-from weighbridge.papers import PAPERS, items_of, settings_of
-from weighbridge.papers.claims import (
-    EXACT,
-    Conditions,
-    Found,
-    Item,
-    Section,
-    Verdict,
-    document,
-    same,
-)
+from weighbridge.papers import PAPERS, Item, Verdict, items_of, settings_of
+from weighbridge.papers.claims import EXACT, Conditions, Found, Section, document, same
 from weighbridge.papers.du2025_equations import equations as du2025_equations
 from weighbridge.papers.galvao_equations import equations as galvao_equations
 from weighbridge.papers.jensen2022_equations import equations as jensen2022_equations
@@ -74,9 +66,9 @@ def test_a_difference_needs_a_reason_and_a_command():
     nothing = DRAWN.row("a", {})
     assert nothing.verdict is Verdict.NOT_REPRODUCIBLE
     assert nothing.accounted
-    with pytest.raises(ConfigError, match="say why nothing is compared"):
+    with error(ConfigError, "fig. 1"):
         Item(item="fig. 1", where="docs")
-    with pytest.raises(ConfigError, match="within what tolerance"):
+    with error(ConfigError, "fig. 1"):
         Item(item="fig. 1", where="docs", ours="{ratio}")
 
 

@@ -8,10 +8,9 @@ import pytest
 from numpy.testing import assert_array_equal
 from tests.unit.test_checks import CAR, GNSS, make_drive, shifted
 
+from weighbridge import Drive, Signal, inspect_drive, read_drive
 from weighbridge.checks import check_drive, correct_drive
-from weighbridge.io import read_drive, write_drive
-from weighbridge.pipeline.inspection import inspect_drive
-from weighbridge.signals import Drive, Signal
+from weighbridge.io import write_drive
 from weighbridge.signals.cleaning import clean_columns
 
 IMU = tuple(f"{kind}_{a}" for kind in ("accel", "gyro") for a in "xyz")

@@ -6,8 +6,7 @@ import pytest
 from tests.noted import refused, says
 from tests.unit.test_alignment import road_speed
 
-from weighbridge.errors import ConfigError
-from weighbridge.io import read_drive
+from weighbridge import ConfigError, read_drive
 from weighbridge.messages import phrase
 
 WHEEL = np.arange(0.0, 600.0, 0.25)

@@ -10,12 +10,13 @@ from numpy.testing import assert_allclose, assert_array_equal
 from tests.noted import has, says
 
 import weighbridge as wb
+from weighbridge import Drive, Signal
 from weighbridge.checks.smoothed_imu import check_smoothed
 from weighbridge.navigation import clock_lag
 from weighbridge.navigation.clock_drift import correct_clocks
 from weighbridge.navigation.clock_lag import Integrated
 from weighbridge.navigation.identify import gain
-from weighbridge.signals import QUANTITIES, Drive, Signal
+from weighbridge.signals import QUANTITIES
 from weighbridge.simulation import (
     MIDSIZE,
     Scenario,

@@ -7,9 +7,8 @@ import pytest
 from tests.noted import noted
 from tests.unit.test_report import MASS, Elements, make_weighing, written
 
+from weighbridge import ConfigError, Problem
 from weighbridge.customary import shown_amount, shown_in, shown_unit
-from weighbridge.errors import ConfigError
-from weighbridge.messages import Problem
 from weighbridge.report import mass_figure
 from weighbridge.report.style import blank, in_shown_units, line
 

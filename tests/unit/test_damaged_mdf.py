@@ -12,10 +12,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
-from tests.noted import has
+from tests.noted import error, has
 
-from weighbridge.errors import DriveError, WeighbridgeError
-from weighbridge.io import read_drive
+from weighbridge import DriveError, WeighbridgeError, read_drive
 from weighbridge.io.mdf_repair import corrected, guard
 from weighbridge.messages import phrase
 
@@ -163,10 +162,10 @@ def test_a_file_without_its_data_is_refused_in_a_sentence(tmp_path):
     raw = log("sorted")
     path = tmp_path / "log.mf4"
     path.write_bytes(raw[: raw.index(b"##SD")])
-    with pytest.raises(DriveError, match="of its 200 records none is whole"):
+    with error(DriveError, "log.mf4 200"):
         read_drive(path)
     path.write_bytes(raw[:300])
-    with pytest.raises(DriveError, match="nothing is whole"):
+    with error(DriveError, "log.mf4"):
         read_drive(path)
 
 
@@ -223,18 +222,18 @@ def test_mdf_3(tmp_path):
 @pytest.mark.parametrize(
     ("at", "form", "value", "says"),
     [
-        (lambda raw: group_3(raw) + 4, "<I", None, "two links lead to the block"),
+        (lambda raw: group_3(raw) + 4, "<I", None, "log.mdf 1238"),
         (lambda raw: struct.unpack_from("<I", raw, group_3(raw) + 8)[0] + 22, "<I", 1 << 31,
-         "are more than there are"),
-        (lambda raw: raw.index(b"CN", group_3(raw)) + 186, "<H", 4000, "stands outside records"),
-        (lambda raw: raw.index(b"CN", group_3(raw)) + 226, "<H", 4000, "stands outside records"),
+         "log.mdf 34359738368 598"),
+        (lambda raw: raw.index(b"CN", group_3(raw)) + 186, "<H", 4000, "log.mdf 16"),
+        (lambda raw: raw.index(b"CN", group_3(raw)) + 226, "<H", 4000, "log.mdf 16"),
     ],
 )  # fmt: skip
 def test_damaged_mdf_3(tmp_path, at, form, value, says):
     path = written(tmp_path, "3.30")
     raw = path.read_bytes()
     patched(path, form, at, group_3(raw) if value is None else value)
-    with pytest.raises(DriveError, match=says):
+    with error(DriveError, says):
         read_drive(path)
 
 
@@ -246,7 +245,7 @@ def test_links_in_a_circle(tmp_path, kind, link):
     path = tmp_path / "log.mf4"
     path.write_bytes(raw)
     if kind == b"##CN":
-        with pytest.raises(DriveError, match="of its 200 records none is whole"):
+        with error(DriveError, "log.mf4 200"):
             read_drive(path)
         return
     drive = read_drive(path)
@@ -269,7 +268,7 @@ def test_channels_beyond_their_record(tmp_path, form, at, value):
     raw = bytearray(path.read_bytes())
     struct.pack_into(form, raw, at(raw), *(value if isinstance(value, tuple) else (value,)))
     path.write_bytes(raw)
-    with pytest.raises(DriveError, match="of its 40 records none is whole"):
+    with error(DriveError, "log.mf4 40"):
         read_drive(path)
 
 
@@ -284,7 +283,7 @@ def test_start_in_no_calendar(tmp_path):
 def test_packed_data_without_records_end(tmp_path):
     path = written(tmp_path, compression=1)
     patched(path, "<Q", lambda raw: body(raw, b"##CG") + 8, 0)
-    with pytest.raises(DriveError, match="no samples"):
+    with error(DriveError, "log log.mf4 vehicle_speed"):
         read_drive(path)
 
 
@@ -300,7 +299,7 @@ def test_records_beyond_the_data_take_no_memory(tmp_path, cycles, length):
         speed = read_drive(path).signals["vehicle_speed"]
         assert_allclose(speed.values, RISING[:cycles])
     else:
-        with pytest.raises(DriveError, match="none is whole"):
+        with error(DriveError, "log.mf4"):
             read_drive(path)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
@@ -313,7 +312,7 @@ def test_identifier_that_is_no_number(tmp_path):
     raw[body(raw, b"##CN", 2) + 2] = 10
     path = tmp_path / "log.mf4"
     path.write_bytes(raw)
-    with pytest.raises(DriveError, match="field ID of the frames is no number"):
+    with error(DriveError, "log.mf4 ID"):
         read_drive(path)
 
 
@@ -325,7 +324,7 @@ def test_values_of_variable_length_beyond_their_data(tmp_path, length):
     struct.pack_into("<I", raw, at, length)
     path = tmp_path / "log.mf4"
     path.write_bytes(raw)
-    with pytest.raises(DriveError, match="stands outside its data"):
+    with error(DriveError, "log.mf4"):
         read_drive(path)
 
 
@@ -336,7 +335,7 @@ def test_places_of_values_beyond_their_data(tmp_path, offset):
     struct.pack_into("<Q", raw, body(raw, b"##DT") + 100 * size + 13, offset)
     path = tmp_path / "log.mf4"
     path.write_bytes(raw)
-    with pytest.raises(DriveError, match="stands outside its data"):
+    with error(DriveError, "log.mf4"):
         read_drive(path)
 
 
@@ -352,13 +351,13 @@ def test_one_long_value_does_not_fill_the_memory():
     data = struct.pack("<I", long) + bytes(long) + bytes(4)
     offsets = np.full(10_000, long + 4, np.uint64)
     offsets[0] = 0
-    with pytest.raises(ValueError, match=f"claims {long} bytes"):
+    with error(ValueError, long):
         mdf_v4.extract(data, True, offsets)
 
 
 @pytest.mark.parametrize("layout", LAYOUTS)
 @settings(
-    max_examples=25,
+    max_examples=15,
     deadline=None,
     derandomize=True,
     suppress_health_check=[HealthCheck.function_scoped_fixture],

@@ -6,14 +6,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from tests.noted import error
 
-from weighbridge.balance import Reason
-from weighbridge.balance.table import ForceTable
-from weighbridge.errors import ConfigError
+from weighbridge import ConfigError, Drive, Signal, Vehicle
+from weighbridge.balance import ForceTable, Reason
 from weighbridge.estimators.joint.confounded import inertia_relative_std
 from weighbridge.estimators.joint.slow_errors import DATA_SHEET_NAMES, NAMES, design, prior_std
 from weighbridge.estimators.judging import SQUAT_STD, uncalibrated_std
-from weighbridge.signals import Drive, Signal
 from weighbridge.vehicle.data_sheet import (
     ACCESSORY_POWER,
     by_data_sheet,
@@ -21,7 +20,7 @@ from weighbridge.vehicle.data_sheet import (
     scale_std,
     wheel_efficiency,
 )
-from weighbridge.vehicle.model import Driveline, Provenance, TorqueModel, Vehicle
+from weighbridge.vehicle.model import Driveline, Provenance, TorqueModel
 from weighbridge.vehicle.torque import engine_torque
 
 GEARS = (12.0, 7.0, 4.5, 3.2)
@@ -110,7 +109,7 @@ def test_friction_in_percent_torque_may_grow_with_engine_speed():
     )
     found = engine_torque(drive, Vehicle(torque=model), speed, time)
     assert_allclose(found.torque, [100 - 10 - 2 - 1, 100 - 10 - 4 - 4, 100 - 10 - 6 - 9])
-    with pytest.raises(ConfigError, match="two coefficients"):
+    with error(ConfigError, "percent 1"):
         replace(model, coefficients=(1.0,))
 
 

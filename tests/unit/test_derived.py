@@ -6,9 +6,9 @@ import numpy as np
 import polars as pl
 import pytest
 
+from weighbridge import Drive, DriveInfo, Signal
 from weighbridge.checks.derived import NAME, without_derived
 from weighbridge.io.draft import draft
-from weighbridge.signals import Drive, DriveInfo, Signal
 
 TIME = np.arange(0.0, 1200.0, 0.1)
 SPEED = 15.0 + 9.0 * np.sin(TIME / 23.0) + 3.0 * np.sin(TIME / 7.0)

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from weighbridge import Signal
 from weighbridge.checks import correct_drive
 from weighbridge.checks.digits import with_half_digits
-from weighbridge.signals import Signal
 from weighbridge.simulation import make_scenario, simulate_car
 
 ACCEL = ("accel_x", "accel_y", "accel_z")

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 from tests.noted import refused
 
+from weighbridge import Problem, Vehicle
 from weighbridge.calibration import questionable_masses as module
 from weighbridge.calibration.questionable_masses import (
     contradicting,
@@ -13,8 +14,8 @@ from weighbridge.calibration.questionable_masses import (
     unbacked_scale,
     with_findings,
 )
-from weighbridge.messages import Problem, phrase
-from weighbridge.vehicle.model import TorqueModel, Vehicle
+from weighbridge.messages import phrase
+from weighbridge.vehicle.model import TorqueModel
 
 NAMES, MASSES = ("a", "b", "c"), (1600.0, 1800.0, 2000.0)
 STDS = np.full(3, 0.006)

@@ -6,8 +6,7 @@ import pytest
 from numba import config
 
 import weighbridge as wb
-from weighbridge.messages import Problem
-from weighbridge.signals import Signal
+from weighbridge import Problem, Signal
 from weighbridge.simulation import Sensors, make_scenario, simulate_car
 
 pytestmark = pytest.mark.skipif(

@@ -6,7 +6,7 @@ import numba
 import pytest
 
 import weighbridge as wb
-from weighbridge.signals import Signal
+from weighbridge import Signal
 from weighbridge.simulation import Sensors, make_scenario, simulate_car
 
 pytestmark = pytest.mark.skipif(

@@ -5,15 +5,13 @@ import tomllib
 import numpy as np
 import polars as pl
 import pytest
+from tests.noted import error
 
-from weighbridge.errors import ConfigError, DriveError, WeighbridgeError
-from weighbridge.io import read_drive
+from weighbridge import ConfigError, DriveError, WeighbridgeError, read_drive
 from weighbridge.io.draft import draft
-from weighbridge.io.draft_text import HEAD_LINES
 from weighbridge.io.file_patterns import file_patterns
 from weighbridge.io.mapping import load_mapping
 from weighbridge.io.mapping_text import mapping_text
-from weighbridge.io.table import head
 
 ROWS = 400
 T = 0.25 * np.arange(ROWS)
@@ -140,17 +138,17 @@ def test_several_files_of_a_drive_get_a_table_each(tmp_path):
 @pytest.mark.parametrize(
     ("lines", "words"),
     [
-        ([""], "is empty"),
-        (["hello world"], "no common separator"),
+        ([""], "x.csv"),
+        (["hello world"], "x.csv"),
         (["a,b", "1,2", "3,4"], "no column that can be its time"),
         (["time,b", "1,2", "3,4"], "no column that is known by its name"),
-        (["1,2,3", "2,3,4"], "no header line"),
-        (["time,Speed (km/h)"], "no rows"),
+        (["1,2,3", "2,3,4"], "x.csv 1,2,3 --columns"),
+        (["time,Speed (km/h)"], "x.csv"),
     ],
 )
 def test_what_cannot_be_drafted_is_one_sentence(lines, words, tmp_path):
     path = written(tmp_path / "x.csv", lines)
-    with pytest.raises(DriveError, match=words) as told:
+    with error(DriveError, words) as told:
         draft(path)
     assert str(told.value).startswith(str(path))
     assert "\n" not in str(told.value)
@@ -182,9 +180,6 @@ def test_a_head_that_ends_within_a_character_is_still_utf_8(tmp_path):
             "Geschwindigkeit [km/h]": "vehicle_speed",
             "Länge": "",
         }
-        lines = head(path, HEAD_LINES)
-        assert lines[0].endswith("Länge")
-        assert "Ã" not in "".join(lines)
 
 
 def test_cells_longer_than_a_csv_reader_takes_are_one_sentence_or_a_draft(tmp_path):
@@ -343,7 +338,7 @@ def test_a_table_without_any_time_has_the_number_of_its_rows(tmp_path):
     signals = {"vehicle_speed": {"column": "Vehicle Speed (km/h)"}}
     drive = read_drive(path, {"time": {"rate_hz": 4.0}, "signals": signals})
     assert drive.signals["vehicle_speed"].duration == pytest.approx(T[-1])
-    with pytest.raises(DriveError, match="or rate_hz where the rows are even"):
+    with error(DriveError, "x.csv [time] rate_hz"):
         read_drive(path, {"signals": signals})
 
 
@@ -374,14 +369,14 @@ def test_a_counter_that_falls_or_leaps_counts_no_rows(tmp_path):
     ("time", "words"),
     [
         ({"column": "Sample", "rate_hz": 0}, "must be more than 0 rows per second, got 0"),
-        ({"column": "Sample", "rate_hz": 4, "unit": "ms"}, "stands beside rate_hz"),
-        ({"column": "Sample", "rate_hz": 4, "format": "iso"}, "stands beside rate_hz"),
-        ({"column": "Samples", "rate_hz": 4}, "has no time column 'Samples'"),
+        ({"column": "Sample", "rate_hz": 4, "unit": "ms"}, "rate_hz"),
+        ({"column": "Sample", "rate_hz": 4, "format": "iso"}, "rate_hz"),
+        ({"column": "Samples", "rate_hz": 4}, "counted.csv Samples Sample"),
     ],
 )
 def test_a_rate_that_cannot_be_is_refused(time, words, tmp_path):
     signals = {"vehicle_speed": {"column": "Vehicle Speed (km/h)"}}
-    with pytest.raises(WeighbridgeError, match=words):
+    with error(WeighbridgeError, words):
         read_drive(counted(tmp_path), {"time": time, "signals": signals})
 
 
@@ -442,7 +437,7 @@ def test_what_stands_around_the_names_is_left_out(make, tmp_path):
 def test_columns_of_a_text_without_a_header_are_named_in_their_order(tmp_path):
     rows = [f"{v:.2f};{1000.0 * t:.0f};7;{n:.0f}" for t, v, n in zip(T, SPEED, RPM, strict=True)]
     path = written(tmp_path / "bare.csv", rows)
-    with pytest.raises(DriveError, match="name its 4 columns in their order"):
+    with error(DriveError, "bare.csv 60.00;0;7;1800 4 --columns"):
         draft(path)
     found = draft(path, ["speed_kmh", "time_ms", "-", "rpm"])
     assert found.rows == ROWS
@@ -455,20 +450,20 @@ def test_columns_of_a_text_without_a_header_are_named_in_their_order(tmp_path):
 
 def test_a_first_row_of_a_clock_and_empty_cells_is_no_header(tmp_path):
     rows = [row + ";;" for row in clock_rows(range(90), "0")]
-    with pytest.raises(DriveError, match=r"has no header line.*--columns"):
+    with error(DriveError, "obd.csv 08:00:02,610;0;; 4 --columns"):
         draft(written(tmp_path / "obd.csv", rows))
 
 
 @pytest.mark.parametrize(
     ("names", "said"),
     [
-        (["time_s", "speed"], "2 columns are named and its rows have 3, such as '1,2,3'"),
-        (["time_s", "rpm", "rpm"], "two columns are called 'rpm'"),
+        (["time_s", "speed"], "bare.csv 2 3 1,2,3"),
+        (["time_s", "rpm", "rpm"], "bare.csv rpm"),
     ],
 )
 def test_names_that_do_not_fit_the_columns_are_refused(tmp_path, names, said):
     path = written(tmp_path / "bare.csv", [f"{k},2,3" for k in range(1, 30)])
-    with pytest.raises(DriveError, match=said):
+    with error(DriveError, said):
         draft(path, names)
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from weighbridge.io import read_drives
+from weighbridge import read_drives
 from weighbridge.io.draft import draft
 from weighbridge.io.draft_alike import merged
 from weighbridge.io.mapping_text import mapping_text

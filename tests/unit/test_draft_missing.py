@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from tests.noted import error
 
-from weighbridge.errors import DriveError
-from weighbridge.io import read_drive
+from weighbridge import DriveError, read_drive
 from weighbridge.io.draft import draft
 from weighbridge.io.draft_missing import missing
 from weighbridge.io.mapping_text import mapping_text
@@ -102,7 +102,7 @@ def test_cells_that_are_no_numbers_are_shown(tmp_path):
 
 def test_lines_that_end_in_carriage_returns_alone_are_told(tmp_path):
     (tmp_path / "mac.csv").write_bytes(b"time_s,rpm\r0,900\r1,950\r2,980\r")
-    with pytest.raises(DriveError, match="lines end in carriage returns alone"):
+    with error(DriveError, "mac.csv Macintosh"):
         draft(tmp_path / "mac.csv")
 
 

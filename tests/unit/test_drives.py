@@ -6,8 +6,7 @@ import pytest
 from numpy.testing import assert_array_equal
 from tests.drives import Kept
 
-from weighbridge.simulation import make_scenario
-from weighbridge.simulation.simulate import simulate_car
+from weighbridge.simulation import make_scenario, simulate_car
 
 
 def scenario(seed=7):

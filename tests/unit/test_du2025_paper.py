@@ -5,13 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from weighbridge.estimators.hybrid import Blend
 from weighbridge.estimators.settings import changed, parsed
-from weighbridge.papers import du2025
+from weighbridge.papers import Reproduced, du2025
 from weighbridge.papers.du2025_claims import CLAIMS
 from weighbridge.papers.du2025_methods import BAND, FORMS, METHODS, PAPER_RMSE, READINGS
 from weighbridge.papers.du2025_told import swing, told
-from weighbridge.papers.reproduced import Reproduced
 
 SEED = 3
 
@@ -89,10 +87,11 @@ def test_settings_of_the_command_reach_every_method():
         assert (least.forgetting, least.window, least.offset_std) == (0.999, 0.0, 0.0)
         assert least.rolling_coefficient == 6e-4
         assert least.every_row
-    assert settings.estimators["hybrid"].keywords["settings"].blend is Blend.SPEED
+    assert settings.estimators["hybrid"].keywords["settings"].blend.value == "speed"
     smaller = changed(du2025.SETTINGS(), {"blend": "variance"})
-    assert smaller.estimators["hybrid"].keywords["settings"].blend is Blend.VARIANCE
-    assert smaller.blended(Blend.INNOVATIONS).chosen.blend is Blend.INNOVATIONS
+    assert smaller.estimators["hybrid"].keywords["settings"].blend.value == "variance"
+    blend = type(smaller.estimators["hybrid"].keywords["settings"].blend)("innovations")
+    assert smaller.blended(blend).chosen.blend is blend
 
 
 def test_lambda_start_and_noise_of_the_paper_are_settings_of_the_command():
@@ -102,7 +101,7 @@ def test_lambda_start_and_noise_of_the_paper_are_settings_of_the_command():
     assert settings.estimators["ekf"].keywords["settings"].start_std == 1e-4
     ours = replace(settings, as_printed=False)
     assert ours.estimators["ekf"].keywords["settings"].accel_walk == 0.3
-    assert ours.estimators["hybrid"].keywords["settings"].blend is Blend.INNOVATIONS
+    assert ours.estimators["hybrid"].keywords["settings"].blend.value == "innovations"
 
 
 def test_a_braking_moves_the_least_squares_and_not_the_kalman_filter(judged):

@@ -6,14 +6,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from scipy.signal import lfilter
+from tests.noted import error
 
-from weighbridge.balance import ForceBalance, Reason
-from weighbridge.balance.table import ForceTable
-from weighbridge.errors import ConfigError
-from weighbridge.estimators import ESTIMATORS, Status, ekf, hybrid, robust_rls
+from weighbridge import ConfigError, Status, Vehicle
+from weighbridge.balance import ForceBalance, ForceTable, Reason
+from weighbridge.estimators import ESTIMATORS, ekf, hybrid, robust_rls
 from weighbridge.kernels import mass_ekf as kernel
 from weighbridge.kernels import robust_rls as rls_kernel
-from weighbridge.vehicle.model import Driveline, Provenance, RoadLoad, TorqueModel, Vehicle
+from weighbridge.vehicle.model import Driveline, Provenance, RoadLoad, TorqueModel
 
 METHODS = ("robust-rls", "ekf", "hybrid")
 BUS = Vehicle(
@@ -327,18 +327,18 @@ def test_every_blend_lies_between_both_filters(blend):
 @pytest.mark.parametrize(
     ("settings", "bad", "said"),
     [
-        (robust_rls.RobustRlsSettings, {"memory": 0.0}, "memory must be a positive number, got 0"),
-        (robust_rls.RobustRlsSettings, {"offset_std": -1.0}, "offset_std must be zero or positive"),
-        (ekf.EkfSettings, {"speed_noise": np.nan}, "speed_noise must be a positive number"),
-        (ekf.EkfSettings, {"mass_walk": -1.0}, "mass_walk must be zero or positive"),
-        (hybrid.HybridSettings, {"blend_width": 0.0}, "blend_width must be positive, got 0"),
-        (hybrid.HybridSettings, {"blend": "wind"}, "blend must be speed, .*, got .*wind"),
-        (hybrid.HybridSettings, {"blend_share": 2.0}, "blend_share must be between -1 and 1"),
-        (robust_rls.RobustRlsSettings, {"forgetting": 0.5}, r"forgetting must be in \(0.9, 1\]"),
-        (robust_rls.RobustRlsSettings, {"rolling_coefficient": -0.1}, "must be zero or positive"),
-        (ekf.EkfSettings, {"start_mass": 0.0}, "start_mass must be a positive number, got 0"),
+        (robust_rls.RobustRlsSettings, {"memory": 0.0}, "memory 0.0"),
+        (robust_rls.RobustRlsSettings, {"offset_std": -1.0}, "offset_std -1.0"),
+        (ekf.EkfSettings, {"speed_noise": np.nan}, "speed_noise nan"),
+        (ekf.EkfSettings, {"mass_walk": -1.0}, "mass_walk -1.0"),
+        (hybrid.HybridSettings, {"blend_width": 0.0}, "blend_width 0.0"),
+        (hybrid.HybridSettings, {"blend": "wind"}, "speed wind"),
+        (hybrid.HybridSettings, {"blend_share": 2.0}, "blend_share -1 1 2"),
+        (robust_rls.RobustRlsSettings, {"forgetting": 0.5}, "0.9 1 0.5"),
+        (robust_rls.RobustRlsSettings, {"rolling_coefficient": -0.1}, "rolling_coefficient -0.1"),
+        (ekf.EkfSettings, {"start_mass": 0.0}, "start_mass 0.0"),
     ],
 )
 def test_impossible_settings_are_refused(settings, bad, said):
-    with pytest.raises(ConfigError, match=said):
+    with error(ConfigError, said):
         settings(**bad)

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from weighbridge import Drive, Signal, Vehicle
 from weighbridge.pipeline.expected import (
     ENOUGH,
     EXPECTED,
@@ -14,8 +15,7 @@ from weighbridge.pipeline.expected import (
     excitation,
     expected,
 )
-from weighbridge.signals import Drive, Signal
-from weighbridge.vehicle.model import Provenance, Vehicle
+from weighbridge.vehicle.model import Provenance
 
 HOME = Path(__file__).parents[2]
 PAGE = (HOME / "docs" / "accuracy.md").read_text("utf-8")

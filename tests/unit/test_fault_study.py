@@ -21,8 +21,7 @@ from fault_subjects import METHODS, build
 from fault_workers import done_apart
 from tests.noted import noted
 
-from weighbridge.io import read_drive
-from weighbridge.signals import Signal
+from weighbridge import Signal, read_drive
 
 needs_compiler = pytest.mark.skipif(
     numba.config.DISABLE_JIT, reason="half a million steps need compiled code"

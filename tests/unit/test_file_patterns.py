@@ -6,8 +6,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from weighbridge.errors import DriveError
-from weighbridge.io import read_drive
+from weighbridge import DriveError, read_drive
 from weighbridge.io.draft import draft
 from weighbridge.io.draft_alike import kinds
 from weighbridge.io.file_patterns import file_patterns

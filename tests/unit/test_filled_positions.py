@@ -6,8 +6,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 import weighbridge as wb
+from weighbridge import Signal
 from weighbridge.io.filled_positions import fix_rows, true_fixes
-from weighbridge.signals import Signal
 
 EARTH = 6.37e6
 

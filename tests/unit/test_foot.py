@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from weighbridge import Drive, Signal, Vehicle
 from weighbridge.balance import Reason, force_balance
 from weighbridge.balance.floor import Floor, find_floor
 from weighbridge.balance.foot import find_foot, unsmoothed
@@ -13,8 +14,7 @@ from weighbridge.balance.foot_setup import learn_dragged, near
 from weighbridge.constants import GRAVITY
 from weighbridge.kernels import two_states
 from weighbridge.navigation.motion import Motion
-from weighbridge.signals import Drive, Signal
-from weighbridge.vehicle.model import Driveline, RoadLoad, Timing, TorqueModel, Vehicle
+from weighbridge.vehicle.model import Driveline, RoadLoad, Timing, TorqueModel
 
 END = 1200.0
 CLOCK = np.arange(0.0, END, 0.05)

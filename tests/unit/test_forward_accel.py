@@ -7,10 +7,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import weighbridge as wb
+from weighbridge import Drive, Signal, inspect_drive
 from weighbridge.estimators.joint import changing
 from weighbridge.navigation.along import with_forward_accel
-from weighbridge.pipeline.inspection import inspect_drive
-from weighbridge.signals import Drive, Signal
 from weighbridge.simulation import make_scenario, simulate_car
 
 AXES = ("accel_x", "accel_y", "accel_z")

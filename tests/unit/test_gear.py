@@ -7,8 +7,8 @@ import pytest
 from tests.noted import refused
 
 import weighbridge as wb
+from weighbridge import Signal
 from weighbridge.calibration.problem import find_gears
-from weighbridge.signals import Signal
 from weighbridge.vehicle.engine_delay import find_engine_delay, gathered_delay
 from weighbridge.vehicle.gear import (
     detect_gearings,

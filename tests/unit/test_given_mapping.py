@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
+from tests.noted import error
 
 import weighbridge as wb
-from weighbridge import Vehicle
-from weighbridge.io import to_frames
+from weighbridge import Vehicle, to_frames
 from weighbridge.pipeline.given import mapping_beside, mapping_of
 
 
@@ -120,9 +120,9 @@ def test_frames_are_read_with_the_mapping_that_the_vehicle_file_names(
 
 
 def test_a_mapping_for_a_drive_that_is_read_is_refused(brief_drive, short_car):
-    with pytest.raises(wb.ConfigError, match="read already; give mapping to read_drive"):
+    with error(wb.ConfigError, "car-short read_drive"):
         wb.weigh(brief_drive, short_car, mapping="map.toml")
-    with pytest.raises(wb.ConfigError, match="read already"):
+    with error(wb.ConfigError, "car-short read_drive"):
         wb.calibrate(brief_drive, mass=1500.0, mapping="map.toml")
 
 

@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from weighbridge.errors import DriveError
-from weighbridge.io import read_drive
+from weighbridge import DriveError, read_drive
 from weighbridge.io.formats import format_of
-from weighbridge.io.grouped import is_grouped
 from weighbridge.io.mapping_text import mapping_text
 
 ROWS = 40
@@ -111,5 +109,7 @@ def test_a_time_that_is_none_of_them_is_named(tmp_path):
         "\n\n\n",
     ],
 )
-def test_other_tables_are_none(text):
-    assert not is_grouped(text.encode())
+def test_other_tables_are_none(tmp_path, text):
+    path = tmp_path / "log.csv"
+    path.write_text(text)
+    assert format_of(path).name != "grouped CSV"

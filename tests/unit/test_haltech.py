@@ -3,12 +3,10 @@
 import tomllib
 
 import numpy as np
-import pytest
 from numpy.testing import assert_allclose
-from tests.noted import has
+from tests.noted import error, has
 
-from weighbridge.errors import DriveError
-from weighbridge.io import read_drive
+from weighbridge import DriveError, read_drive
 from weighbridge.io.formats import format_of
 from weighbridge.io.mapping_text import mapping_text
 
@@ -62,5 +60,5 @@ def test_counts_become_values(tmp_path):
 def test_a_head_alone_is_one_sentence(tmp_path):
     path = tmp_path / "log.csv"
     path.write_text("\n".join(lines()[0]) + "\n")
-    with pytest.raises(DriveError, match="lists no channel with rows below"):
+    with error(DriveError, "log.csv CSV NSP"):
         format_of(path).draft(path)

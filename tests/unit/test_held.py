@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from weighbridge import Drive, Signal
 from weighbridge.checks import correct_drive
-from weighbridge.signals import Drive, Signal
 from weighbridge.signals.held import renewed, without_repeats
 
 

@@ -10,11 +10,11 @@ from scipy.ndimage import gaussian_filter1d
 from scipy.signal import lfilter
 from tests.noted import refused, says
 
+from weighbridge import Signal
 from weighbridge.checks import check_drive
 from weighbridge.navigation.aiding import read_imu
 from weighbridge.navigation.identify.gain import find_gain
 from weighbridge.navigation.inertial import inertial_motion
-from weighbridge.signals import Signal
 from weighbridge.simulation import Sensors, make_scenario, simulate_car
 from weighbridge.vehicle.model import Mounting
 

@@ -7,27 +7,26 @@ import numpy as np
 import polars as pl
 import pytest
 from numpy.testing import assert_allclose
-from tests.noted import refused, says
+from tests.noted import error, refused, says
 from tests.unit.test_report import unpacked
 
-from weighbridge.errors import ConfigError
-from weighbridge.inertia.filter import (
+from weighbridge import (
+    ConfigError,
+    Drive,
     InertiaFilter,
-    RideSamples,
-    inverse_interval,
-    run_filter,
+    InertiaSettings,
+    Signal,
+    Vehicle,
+    estimate_inertia,
+    read_drive,
 )
+from weighbridge.inertia.filter import RideSamples, inverse_interval, run_filter
 from weighbridge.inertia.integration import integration_std
 from weighbridge.inertia.load_changes import jumps
 from weighbridge.inertia.ride_checks import ride_samples
-from weighbridge.inertia.settings import InertiaSettings
 from weighbridge.inertia.suspension import check_suspension
-from weighbridge.io import read_drive
 from weighbridge.papers.nguyen2024 import suspension_of
-from weighbridge.pipeline.inertia import estimate_inertia
-from weighbridge.signals import Drive, Signal
 from weighbridge.simulation.ride import TRUCK, RideScenario, RideSensors, simulate_ride
-from weighbridge.vehicle.model import Vehicle
 
 SENSORS = RideSensors(rate=250.0)
 RIDE = replace(suspension_of(TRUCK, SENSORS), zero_mass=TRUCK.sprung_mass, force_std=0.01)
@@ -111,9 +110,9 @@ def test_settings_by_name_are_those_of_the_filter(made):
     # A density of 1 kg²/s lets the mass move by a kilogram in a second.
     off = [abs(w.track.parameters[-1, 0] / made.inertias[-1, 0] - 1.0) for w in (told, usual)]
     assert off[0] > 0.03 > 1.5 * off[1]
-    with pytest.raises(ConfigError, match="noise_densities must be 3 positive numbers"):
+    with error(ConfigError, "noise_densities 3 1.0"):
         estimate_inertia(made.drive, CAR, settings={"noise_densities": [1.0]})
-    with pytest.raises(ConfigError, match="there is no setting 'jumprate'"):
+    with error(ConfigError, "jumprate jump_rate"):
         estimate_inertia(made.drive, CAR, settings={"jumprate": 1.0})
 
 
@@ -126,7 +125,7 @@ def test_a_filter_fed_sample_by_sample_ends_where_the_ride_does(made):
     assert np.array_equal(live.parameters, whole.parameters[-1])
     low, high = live.interval()
     assert np.all((low < live.parameters) & (live.parameters < high))
-    with pytest.raises(ConfigError, match="period must be a positive number"):
+    with error(ConfigError, "0.0"):
         InertiaFilter(RIDE, 0.0)
 
 
@@ -202,9 +201,9 @@ def test_missing_signals_are_named(made):
 
 
 def test_vehicle_without_suspension_is_refused(made):
-    with pytest.raises(ConfigError, match=r"truck has no \[ride\] section"):
+    with error(ConfigError, "truck [ride]"):
         estimate_inertia(made.drive, replace(CAR, ride=None))
-    with pytest.raises(ConfigError, match="unknown method 'kalman'"):
+    with error(ConfigError, "kalman kalman-bucy"):
         estimate_inertia(made.drive, CAR, "kalman")
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
+from weighbridge import Signal
 from weighbridge.kernels.interpolation import (
     distance_to_nearest,
     longest_repeat,
@@ -13,7 +14,6 @@ from weighbridge.kernels.interpolation import (
     seen_windows,
     trapezoid_means,
 )
-from weighbridge.signals import Signal
 from weighbridge.signals.interpolation import interpolate
 from weighbridge.signals.runs import runs_of
 

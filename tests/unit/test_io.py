@@ -8,11 +8,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
-from tests.noted import has, refused, says
+from tests.noted import error, has, refused, says
 
-from weighbridge.errors import DriveError, MissingExtraError
-from weighbridge.io import read_drive, read_table, write_drive, write_table
-from weighbridge.signals import QUANTITIES, Drive, DriveInfo, Signal
+from weighbridge import Drive, DriveError, DriveInfo, MissingExtraError, Signal, read_drive
+from weighbridge.io import read_table, write_drive, write_table
+from weighbridge.signals import QUANTITIES
 
 OBD = "time_s,vehicle_speed_kmh,engine_speed_rpm\n0,36,600\n0.5,54,\n1,72,1200\n"
 
@@ -113,7 +113,7 @@ def test_pieces_of_one_recording_are_joined(tmp_path):
 
 def test_recordings_over_each_other_are_refused(tmp_path):
     a, b = write(tmp_path / "a.csv"), write(tmp_path / "b.csv")
-    with pytest.raises(DriveError, match=r"both in .*a\.csv .* and in .*b\.csv"):
+    with error(DriveError, "vehicle_speed a.csv b.csv"):
         read_drive([a, b])
 
 
@@ -176,17 +176,17 @@ def test_byte_order_mark_line_ends_and_quotes(tmp_path):
 
 
 def test_no_such_file(tmp_path):
-    with pytest.raises(DriveError, match="nowhere: no such file or folder"):
+    with error(DriveError, "nowhere"):
         read_drive(tmp_path / "nowhere")
 
 
 def test_no_files_at_all():
-    with pytest.raises(DriveError, match="no file was given"):
+    with error(DriveError):
         read_drive([])
 
 
 def test_folder_without_tables(tmp_path):
-    with pytest.raises(DriveError, match=r"holds no drive: it needs at least one of imu\.csv"):
+    with error(DriveError, "imu.csv obd.csv"):
         read_drive(tmp_path)
 
 
@@ -208,12 +208,12 @@ def test_an_unknown_suffix_is_told_the_nearest_or_what_to_export(tmp_path, name,
 def test_one_table_in_two_formats(tmp_path):
     write(tmp_path / "obd.csv")
     write_table({"time_s": np.arange(3.0), "gear": np.ones(3)}, tmp_path / "obd.parquet")
-    with pytest.raises(DriveError, match=r"obd\.csv and obd\.parquet; keep one of them"):
+    with error(DriveError, "obd.csv obd.parquet"):
         read_drive(tmp_path)
 
 
 def test_missing_unit(tmp_path):
-    with pytest.raises(DriveError, match=r"'vehicle_speed' carries no unit; name it .*_kmh"):
+    with error(DriveError, "obd.csv vehicle_speed vehicle_speed_kmh"):
         read_drive(write(tmp_path / "obd.csv", "time_s,vehicle_speed\n0,1\n"))
 
 
@@ -239,13 +239,13 @@ def test_foreign_columns_without_a_mapping(tmp_path):
 
 
 def test_empty_file(tmp_path):
-    with pytest.raises(DriveError, match="is empty: it has no header line"):
+    with error(DriveError, "obd.csv"):
         read_drive(write(tmp_path / "obd.csv", ""))
 
 
 def test_tables_with_headers_only(tmp_path):
     write(tmp_path / "obd.csv", "time_s,vehicle_speed_kmh\n")
-    with pytest.raises(DriveError, match=r"holds no samples.*obd\.csv") as caught:
+    with error(DriveError, "obd.csv") as caught:
         read_drive(tmp_path)
     assert says(str(caught.value), "file.no_rows", file="obd.csv")
 
@@ -262,7 +262,7 @@ def test_empty_parquet(tmp_path):
     pl.DataFrame(
         {"time_s": [], "gear": []}, schema={"time_s": pl.Float64, "gear": pl.Float64}
     ).write_parquet(tmp_path / "obd.parquet")
-    with pytest.raises(DriveError, match="holds no samples"):
+    with error(DriveError, "obd.parquet"):
         read_drive(tmp_path)
 
 
@@ -305,12 +305,12 @@ def test_cells_that_are_no_numbers_are_left_out_and_counted(tmp_path):
 
 def test_column_of_text_is_refused(tmp_path):
     write(tmp_path / "obd.csv", "time_s,gear\n0,first\n1,second\n2,3\n")
-    with pytest.raises(DriveError, match=r"column 'gear' holds text such as 'first' \(row 1\)"):
+    with error(DriveError, "obd.csv gear first 1"):
         read_drive(tmp_path)
 
 
 def test_time_of_text_is_refused(tmp_path):
-    with pytest.raises(DriveError, match=r"column 'time_s' holds text such as '12:00:00'"):
+    with error(DriveError, "obd.csv time_s 12:00:00"):
         read_drive(write(tmp_path / "obd.csv", "time_s,gear\n12:00:00,1\n12:00:01,2\n"))
 
 
@@ -338,7 +338,7 @@ def test_truncated_parquet(tmp_path, part):
     path = tmp_path / "imu.parquet"
     write_table({"time_s": np.arange(1000.0), "accel_x_mps2": np.arange(1000.0)}, path)
     path.write_bytes(path.read_bytes()[:part])
-    with pytest.raises(DriveError, match=r"imu\.parquet is not a readable Parquet file") as caught:
+    with error(DriveError, "imu.parquet Parquet") as caught:
         read_drive(tmp_path)
     assert "\n" not in str(caught.value)
 
@@ -347,7 +347,7 @@ def test_parquet_under_a_csv_name(tmp_path):
     path = tmp_path / "imu.parquet"
     write_table({"time_s": np.arange(10.0), "gear": np.arange(10.0)}, path)
     path.rename(tmp_path / "imu.csv")
-    with pytest.raises(DriveError, match="is not a text table"):
+    with error(DriveError, "imu.csv .parquet .mf4"):
         read_drive(tmp_path)
 
 

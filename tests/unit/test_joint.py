@@ -8,6 +8,7 @@ from numpy.testing import assert_allclose
 from tests.noted import refused
 
 import weighbridge as wb
+from weighbridge import Signal
 from weighbridge.balance import Reason
 from weighbridge.balance.averaging import windows
 from weighbridge.estimators import joint
@@ -16,7 +17,6 @@ from weighbridge.estimators.joint import forward as joint_forward
 from weighbridge.estimators.joint.slow_errors import DATA_SHEET_NAMES, design, usable_rows
 from weighbridge.estimators.noisy_motion import too_low
 from weighbridge.report.slow_section import constants_table
-from weighbridge.signals import Signal
 from weighbridge.simulation import MIDSIZE, Scenario, short_route, simulate_car
 from weighbridge.vehicle.model import Driveline, TorqueModel
 

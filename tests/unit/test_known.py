@@ -3,14 +3,14 @@
 from pathlib import Path
 
 import pytest
+from tests.noted import error, named
 
-from weighbridge.errors import ConfigError
+from weighbridge import ConfigError, Vehicle
 from weighbridge.vehicle.classes import VEHICLE_CLASSES
 from weighbridge.vehicle.data_sheet import RADIUS_STD
 from weighbridge.vehicle.description import can_weigh, tell
 from weighbridge.vehicle.file import save_vehicle
 from weighbridge.vehicle.known import Known, describe
-from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
 from weighbridge.vehicle.tyre import rolling_radius
 
@@ -68,7 +68,7 @@ def test_radius_of_a_truck_tyre_is_that_of_its_diameter(size, diameter):
     ],
 )
 def test_what_is_no_tyre_size_is_told(size):
-    with pytest.raises(ConfigError, match="tyre size"):
+    with error(ConfigError, size):
         rolling_radius(size)
 
 
@@ -113,27 +113,27 @@ def test_a_data_sheet_with_measured_torque_can_weigh(tmp_path):
 @pytest.mark.parametrize(
     ("known", "words"),
     [
-        ({"tare": 3483.0, "gross": 2000.0}, "gross of 2000 kg is not above the tare"),
-        ({"tare": 50.0}, "tare of 50 kg: a car has 250 to 8000 kg"),
+        ({"tare": 3483.0, "gross": 2000.0}, "2000 3483"),
+        ({"tare": 50.0}, "50 car 250 8000"),
         (
             {"kind": "lorry"},
-            "class must be motorcycle, racer, quad, car, hybrid, van, bus or truck",
+            "lorry motorcycle racer quad car hybrid van bus truck",
         ),
         ({"gear_ratios": (1.0, 2.0)}, "must fall"),
         ({"gear_ratios": (2.0, -1.0)}, "must be positive"),
         ({"final_drive": 3.9}, "needs gear ratios"),
         ({"drag_coefficient": 0.3}, "belong together"),
         ({"reference_torque": 320.0}, "name percent"),
-        ({"tyre": "winter"}, "tyre size"),
-        ({"engine": "steam"}, "engine must be petrol, diesel or electric"),
-        ({"torque": "guess"}, "torque must be"),
+        ({"tyre": "winter"}, "winter"),
+        ({"engine": "steam"}, "steam petrol diesel electric"),
+        ({"torque": "guess"}, "guess percent"),
         ({"radius": 0.49, "tyre": "315/80 R22.5"}, "give the tyre or the radius"),
-        ({"radius": 49.0}, "radius must be between 0.15 and 0.9 m"),
-        ({"driven": "left"}, "driven must be front, rear or all"),
+        ({"radius": 49.0}, "49 0.15 0.9"),
+        ({"driven": "left"}, "left front rear all"),
     ],
 )
 def test_what_cannot_be_is_refused(known, words):
-    with pytest.raises(ConfigError, match=words):
+    with error(ConfigError, words):
         describe(Known(**known))
 
 
@@ -145,9 +145,9 @@ def test_all_that_cannot_be_is_told_at_once():
     with pytest.raises(ConfigError) as refused:
         describe(Known(**wrong))
     told = str(refused.value).split("; ")
-    for words in ("tare of", "engine must", "tyre size", "driven must", "layout must", "must fall",
-                  "frontal area must", "belong together", "torque must"):  # fmt: skip
-        assert sum(words in one for one in told) == 1, (words, told)
+    for values in ("50 250 8000", "steam petrol", "winter", "left front", "flat", "1.0 2.0",
+                   "-2.0", "guess percent"):  # fmt: skip
+        assert sum(named(one, values) for one in told) == 1, (values, told)
 
 
 def test_a_truck_by_radius_and_axles_weighs_by_data_sheet(tmp_path):
@@ -179,7 +179,7 @@ def test_the_engine_is_kept_in_the_file_and_told(tmp_path):
     assert Vehicle.load(path).engine == "diesel"
     assert "car 'vehicle', diesel engine" in dict(tell(Vehicle.load(path)))["vehicle"]
     path.write_text('[vehicle]\nengine = "steam"\n')
-    with pytest.raises(ConfigError, match="engine must be petrol, diesel or electric"):
+    with error(ConfigError, "v.toml 2 steam petrol diesel electric"):
         Vehicle.load(path)
 
 

@@ -3,16 +3,13 @@
 from dataclasses import replace
 
 import pytest
-from tests.noted import refused
+from tests.noted import error, refused
 
 import weighbridge as wb
+from weighbridge import ConfigError, Drive, DriveInfo, Vehicle
 from weighbridge.calibration.known_mass import POUND, check_mass, drag_finding, scale_finding
-from weighbridge.errors import ConfigError
-from weighbridge.signals import Drive
-from weighbridge.signals.drive import DriveInfo
-from weighbridge.simulation import Sensors, simulate_car
-from weighbridge.simulation.named import make_scenario
-from weighbridge.vehicle.model import RoadLoad, TorqueModel, Vehicle
+from weighbridge.simulation import Sensors, make_scenario, simulate_car
+from weighbridge.vehicle.model import RoadLoad, TorqueModel
 
 DRIVE = Drive("drive", {})
 
@@ -67,9 +64,8 @@ def test_a_torque_twice_too_strong_is_pounds():
 
 
 def test_a_mass_of_a_truck_leads_to_its_class():
-    words = r"drive: taken for a car, .* weighbridge vehicle new --class truck -o base.toml"
     for kg in (10_203.0, 4000.0):
-        with pytest.raises(ConfigError, match=words):
+        with error(ConfigError, "drive car", f"{kg:.0f}", "--class truck --vehicle base.toml"):
             check_mass(DRIVE, kg, Vehicle(kind="car"))
     check_mass(DRIVE, 10_203.0, Vehicle(kind="truck"))
 

@@ -6,17 +6,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from weighbridge.errors import ConfigError
-from weighbridge.pipeline.weighing import weigh
-from weighbridge.signals import Signal
-from weighbridge.simulation import make_scenario, simulate_car
-from weighbridge.simulation.car import RPM, SimulatedCar
+from weighbridge import ConfigError, Signal, weigh
+from weighbridge.simulation import SimulatedCar, make_scenario, simulate_car
 from weighbridge.vehicle.classes import VEHICLE_CLASSES
 from weighbridge.vehicle.known import Known, describe
 from weighbridge.vehicle.tyre import rolling_radius
 
 GEARS = (2.58, 1.93, 1.55, 1.33, 1.20, 1.11)
 FINAL_DRIVE = 1.71 * 2.6
+RPM = np.pi / 30.0
 BIKE = SimulatedCar(
     name="motorcycle of 900 cm³, with its rider",
     kind="motorcycle",

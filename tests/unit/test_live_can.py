@@ -5,10 +5,12 @@ from threading import Event, Thread
 
 import numpy as np
 import pytest
+from tests.noted import error
 from tests.simulated_ecu import SimulatedEcu
 from tests.unit.test_stream import truck_rows
 
-from weighbridge.errors import ConfigError, SourceError
+from weighbridge import ConfigError
+from weighbridge.errors import SourceError
 from weighbridge.live import feed as feed_module
 from weighbridge.live.feed import Feed
 from weighbridge.live.sources import canbus, parse_source
@@ -135,7 +137,7 @@ def test_what_is_asked_of_the_interface(monkeypatch):
 
     monkeypatch.setattr(can, "Bus", bus)
     for text in ("can:slcan:/dev/ttyACM0@500000", "can:socketcan:can1"):
-        with pytest.raises(SourceError, match="is the interface there"):
+        with error(SourceError, text):
             parse_source(text, listen_only=True).run(lambda _: None, Event())
     assert asked[0]["bitrate"] == 500000
     assert asked[0]["listen_only"]
@@ -153,7 +155,7 @@ def test_places_that_cannot_be(text):
 
 
 def test_interface_that_no_one_knows():
-    with pytest.raises(ConfigError, match="correct its name"):
+    with error(ConfigError, "can:no_such_thing:can0 python-can"):
         parse_source("can:no_such_thing:can0").run(lambda _: None, Event())
 
 

@@ -9,7 +9,7 @@ from threading import Event, Thread
 
 import pytest
 
-from weighbridge.errors import ConfigError
+from weighbridge import ConfigError
 from weighbridge.io.nmea import UnfitSentenceError, read_sentence
 from weighbridge.live.feed import Feed
 from weighbridge.live.sources import gpsd as gpsd_module

@@ -7,6 +7,7 @@ from threading import Event, Thread
 
 import numpy as np
 import pytest
+from tests.noted import error
 
 from weighbridge.errors import SourceError
 from weighbridge.live.feed import Feed
@@ -210,9 +211,9 @@ def no_trigger(home, imu):
     [
         (unplugged, "iio:device1: No such file"),
         (unbuffered, "enable: No such file"),
-        (unknown_type, "'le:s16/24>>0' is a type that cannot be"),
+        (unknown_type, "'le:s16/24>>0'"),
         (no_gyro, "in_anglvel_z_en: No such file"),
-        (no_trigger, "nothing came for 0.3 s"),
+        (no_trigger, " 0.3 s"),
     ],
 )
 def test_without_a_buffer_values_are_read_one_by_one(
@@ -237,7 +238,7 @@ def test_a_sensor_that_falls_silent_or_goes_is_lost(tmp_path, imu, monkeypatch):
     before = settings(imu)
     with (
         Sensor(tmp_path, imu, most=20),
-        pytest.raises(SourceError, match=r"sent nothing for 0\.3"),
+        error(SourceError, "iio:icm20602 0.3"),
     ):
         source(tmp_path).run(lambda _: None, Event())
     assert settings(imu) == before

@@ -5,8 +5,10 @@ import time
 from threading import Event, Thread
 
 import pytest
+from tests.noted import error
 
-from weighbridge.errors import ConfigError, SourceError
+from weighbridge import ConfigError
+from weighbridge.errors import SourceError
 from weighbridge.live.feed import Feed
 from weighbridge.live.sources import parse_source
 from weighbridge.live.sources.lines import LONGEST, LineReader, LinesSource
@@ -108,7 +110,7 @@ def test_port_in_use():
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
         taken.bind(("127.0.0.1", 0))
         port = taken.getsockname()[1]
-        with pytest.raises(SourceError, match="another program"):
+        with error(SourceError, "127.0.0.1"):
             parse_source(f"lines:udp:{port}").run(lambda _: None, Event())
 
 

@@ -7,9 +7,10 @@ import subprocess
 import sys
 
 import pytest
+from tests.noted import error
 from tests.unit.made_weighings import drive, weighing
 
-from weighbridge.errors import ConfigError, WeighbridgeError
+from weighbridge import ConfigError, WeighbridgeError
 from weighbridge.live.outputs import Outputs
 from weighbridge.live.outputs.lines import Lines, json_line
 
@@ -57,13 +58,13 @@ def test_a_torn_last_line_is_removed_and_a_whole_one_kept(tmp_path, end, kept):
 def test_what_holds_no_json_lines_is_refused_and_kept(tmp_path):
     path = tmp_path / "car.toml"
     path.write_text("[vehicle]\n")
-    with pytest.raises(ConfigError, match="holds no JSON lines; name another file"):
+    with error(ConfigError, "car.toml JSON"):
         Lines(path)
     assert path.read_text() == "[vehicle]\n"
 
 
 def test_a_folder_is_refused_in_a_sentence(tmp_path):
-    with pytest.raises(ConfigError, match="cannot be written"):
+    with error(ConfigError, tmp_path):
         Lines(tmp_path)
 
 
@@ -92,8 +93,7 @@ def test_a_full_disk_is_told_and_leaves_whole_lines(tmp_path, pytestconfig):
     path = tmp_path / "masses.jsonl"
     words = [sys.executable, "-c", FULL, str(path), str(pytestconfig.rootpath)]
     ran = subprocess.run(words, capture_output=True, text=True, check=True)
-    assert "cannot be written" in ran.stdout
-    assert "weighing goes on" in ran.stdout
+    assert str(path) in ran.stdout
     rows = [json.loads(row) for row in path.read_text().splitlines()]
     assert rows[-1]["mass_kg"] == 1.0
     assert resource.getrlimit(resource.RLIMIT_FSIZE)[0] == resource.RLIM_INFINITY

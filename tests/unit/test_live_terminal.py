@@ -10,6 +10,7 @@ from rich.console import Console
 from tests.noted import noted
 from tests.unit.made_weighings import NAMES, drive, health, rests, weighing
 
+from weighbridge import LiveStatus, Problem
 from weighbridge.live.outputs.terminal import (
     PlainLines,
     TerminalView,
@@ -18,8 +19,7 @@ from weighbridge.live.outputs.terminal import (
     terminal,
 )
 from weighbridge.live.outputs.words import needed_text, overload_text, rate_text
-from weighbridge.live.weighing import AlertState, LiveStatus, SignalHealth
-from weighbridge.messages import Problem
+from weighbridge.live.weighing import AlertState, SignalHealth
 
 
 def text(found):

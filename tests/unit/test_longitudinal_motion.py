@@ -5,10 +5,10 @@ import pytest
 from numpy.testing import assert_allclose
 from tests.noted import refused
 
+from weighbridge import Drive, Signal
 from weighbridge.constants import GRAVITY
 from weighbridge.navigation.longitudinal import longitudinal_motion
 from weighbridge.navigation.select import find_motion
-from weighbridge.signals import Drive, Signal
 
 TIME = np.arange(0.0, 600.0, 0.1)
 W = 2.0 * np.pi / 25.0

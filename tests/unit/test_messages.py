@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 import weighbridge
-from weighbridge.errors import ConfigError, DriveError
-from weighbridge.messages import PARTS, Problem, catalogue, phrase, refused
+from weighbridge import ConfigError, DriveError, Problem
+from weighbridge.messages import PARTS, catalogue, phrase, refused
 
 SOURCE = Path(weighbridge.__file__).parent
 FILE = tomllib.loads((SOURCE / "messages.toml").read_text(encoding="utf-8"))

@@ -11,8 +11,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.transform import Rotation
 from tests.noted import refused
 
+from weighbridge import ConfigError, Drive, Signal, Vehicle
 from weighbridge.constants import GRAVITY
-from weighbridge.errors import ConfigError
 from weighbridge.kernels.ins_model import P
 from weighbridge.kernels.lowpass import lowpass_resample
 from weighbridge.messages import phrase
@@ -22,8 +22,7 @@ from weighbridge.navigation.inertial import inertial_motion
 from weighbridge.navigation.rows import place_nodes
 from weighbridge.navigation.select import find_motion
 from weighbridge.navigation.settings import NavigationSettings
-from weighbridge.signals import Drive, Signal
-from weighbridge.vehicle.model import Driveline, Mounting, Vehicle
+from weighbridge.vehicle.model import Driveline, Mounting
 
 SQUAT = 0.004
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import weighbridge as wb
+from weighbridge import Signal
 from weighbridge.checks.vehicle import check_vehicle
-from weighbridge.signals import Signal
 from weighbridge.vehicle.known import Known, describe
 
 

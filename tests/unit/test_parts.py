@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 import weighbridge as wb
+from weighbridge import Signal, read_drives
 from weighbridge.checks import check_drive
 from weighbridge.checks.spikes import without_spikes
-from weighbridge.io import read_drives, write_table
-from weighbridge.signals import Signal
+from weighbridge.io import write_table
 from weighbridge.signals.parts import KEPT, PAUSE, STANDING, find_cuts, find_splices, parted
 from weighbridge.simulation import make_scenario, simulate_car
 

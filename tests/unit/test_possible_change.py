@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
+from weighbridge.estimators.joint import JointSettings
 from weighbridge.estimators.joint.load_stops import change_odds
 from weighbridge.estimators.joint.possible import FEWEST, PossibleChange, averaged
 from weighbridge.estimators.joint.problem import UNMODELLED, FilterInput, filter_params
-from weighbridge.estimators.joint.settings import JointSettings
 from weighbridge.kernels import disturbance
 
 MASS, WINDOWS, NOISE = 3000.0, 240, 100.0

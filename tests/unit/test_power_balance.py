@@ -7,12 +7,11 @@ import pytest
 from numpy.testing import assert_allclose
 
 import weighbridge as wb
-from weighbridge.pipeline.inspection import inspect_drive
-from weighbridge.signals import Drive, Signal
+from weighbridge import Drive, Signal, Vehicle, inspect_drive
 from weighbridge.simulation import ELECTRIC, Sensors, make_scenario, simulate_car
 from weighbridge.vehicle.classes import VEHICLE_CLASSES
 from weighbridge.vehicle.data_sheet import scale_std
-from weighbridge.vehicle.model import Driveline, Provenance, RoadLoad, TorqueModel, Vehicle
+from weighbridge.vehicle.model import Driveline, Provenance, RoadLoad, TorqueModel
 from weighbridge.vehicle.power_balance import METER_STD, by_power, find_power_balance
 from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
 

@@ -10,12 +10,12 @@ import numpy as np
 import polars as pl
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from tests.noted import error
 
-from weighbridge.errors import DriveError
-from weighbridge.io import read_drive, read_table, write_drive
+from weighbridge import DriveError, DriveInfo, read_drive
+from weighbridge.io import read_table, write_drive
 from weighbridge.io.parts import join_parts, part_files
 from weighbridge.live.recorder import Recorder, free_folder
-from weighbridge.signals import DriveInfo
 
 BEGIN = 1_790_000_000.25
 
@@ -178,10 +178,10 @@ def test_a_flood_is_written_before_its_time(tmp_path):
 def test_a_recording_replaces_nothing(tmp_path, brief_drive):
     write_drive(brief_drive, tmp_path / "drive")
     before = {f.name: f.read_bytes() for f in (tmp_path / "drive").iterdir()}
-    with pytest.raises(DriveError, match="not empty, and a recording replaces nothing"):
+    with error(DriveError, "drive"):
         Recorder(tmp_path / "drive")
     assert {f.name: f.read_bytes() for f in (tmp_path / "drive").iterdir()} == before
-    with pytest.raises(DriveError, match="is a file"):
+    with error(DriveError, "obd.csv"):
         Recorder(tmp_path / "drive" / "obd.csv")
 
 
@@ -362,7 +362,7 @@ def test_tables_joined_before_the_process_was_killed_are_read_once(tmp_path):
 def test_a_drive_is_not_written_over_the_parts_of_another(tmp_path, brief_drive):
     recorder = record(tmp_path / "drive", 70, Clock())
     recorder._writer.submit(int).result()
-    with pytest.raises(DriveError, match="is a folder; remove it first"):
+    with error(DriveError, "drive imu.parts"):
         write_drive(brief_drive, tmp_path / "drive")
     recorder._problem = "left"
     recorder.close()

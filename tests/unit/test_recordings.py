@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from tests.unit.test_recorder import Clock, run, second
 
-from weighbridge.io import read_drive
+from weighbridge import read_drive
 from weighbridge.live.recordings import LOOKED, Recordings, series
 
 DAY = 86_400.0

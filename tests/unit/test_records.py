@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
+from weighbridge import DriveInfo
 from weighbridge.live.records import BACK, FARTHEST, Records
-from weighbridge.signals import DriveInfo
 
 NEWEST = 100.0
 LATENESS = 1.0

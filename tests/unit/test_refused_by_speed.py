@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import weighbridge as wb
+from weighbridge import Signal
 from weighbridge.calibration.joint import _would_help
 from weighbridge.messages import phrase
-from weighbridge.signals import Signal
 
 TIME = np.arange(10.0)
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import pytest
 
-from weighbridge.errors import ConfigError
+from weighbridge import ConfigError
 from weighbridge.registry import Registry
 
 

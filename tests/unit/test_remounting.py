@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from weighbridge import Signal, Vehicle
 from weighbridge.balance import force_balance
 from weighbridge.balance.law import drag_force
 from weighbridge.calibration.regression import build_rows
@@ -13,9 +14,8 @@ from weighbridge.navigation.aiding import read_imu
 from weighbridge.navigation.identify.remounting import Change, remounting_notes
 from weighbridge.navigation.inertial import inertial_motion
 from weighbridge.navigation.select import find_motion
-from weighbridge.signals import Signal
 from weighbridge.simulation import make_scenario, simulate_car
-from weighbridge.vehicle.model import Driveline, Mounting, TorqueModel, Vehicle
+from weighbridge.vehicle.model import Driveline, Mounting, TorqueModel
 
 
 @pytest.fixture(scope="module")

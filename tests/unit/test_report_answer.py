@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from tests.unit.test_report import MASS, VEHICLE, Elements, make_weighing, written
 
-from weighbridge.estimators import Status
+from weighbridge import Status, Vehicle
 from weighbridge.report.answer import Answer, advice, answer_block, file_worth, grade
 from weighbridge.report.style import REACH
-from weighbridge.vehicle.model import Provenance, TorqueModel, Vehicle
+from weighbridge.vehicle.model import Provenance, TorqueModel
 
 
 def weighed(std, systematic=math.nan, vehicle=VEHICLE, method="joint", **changed):

@@ -18,8 +18,8 @@ from tests.unit.test_report import (
 from tests.unit.test_report_sections import driven, launches, loaded_on_the_way
 from tests.unit.test_weighing import weighing as weighed_by_rls
 
+from weighbridge import compare
 from weighbridge.balance import Reason
-from weighbridge.pipeline.weighing import compare
 from weighbridge.report.calibration_panels import GEAR_COLOURS, sequence_panel
 from weighbridge.report.document import packed
 from weighbridge.report.maps import positions, track_map

@@ -1,11 +1,10 @@
 """What is said of rides that cannot be put on one clock."""
 
 import numpy as np
-import pytest
+from tests.noted import error
 
-from weighbridge.errors import DriveError
+from weighbridge import Drive, DriveError, Problem, Signal
 from weighbridge.inertia.ride_checks import NEEDED, ride_samples
-from weighbridge.signals import Drive, Problem, Signal
 
 
 def test_a_clock_that_left_one_row_is_told_by_its_cause():
@@ -14,6 +13,6 @@ def test_a_clock_that_left_one_row_is_told_by_its_cause():
         "clock.backwards", source="ride.csv", back="1 s", at="2 s", lost=99, rows=100
     )
     drive = Drive(name="back", signals=signals, problems=(reversed_clock,))
-    with pytest.raises(DriveError, match="one row of the ride") as told:
+    with error(DriveError, "back ride.csv 99 100") as told:
         ride_samples(drive)
     assert reversed_clock.text in str(told.value)

@@ -3,9 +3,10 @@
 from pathlib import Path
 
 import pytest
+from tests.noted import error
 
-from weighbridge.errors import ConfigError
-from weighbridge.vehicle.model import Ride, Vehicle
+from weighbridge import ConfigError, Vehicle
+from weighbridge.vehicle.model import Ride
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "ride-truck" / "vehicle.toml"
 
@@ -31,24 +32,24 @@ def test_units_of_people_are_taken(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "told"),
     [
-        ("rear_damping_nspm = 9804.0", "", "rear_damping is missing.*N s/m"),
-        ("rear_damping_nspm = 9804.0", "rear_damping_nspm = -9804.0", "rear_damping.*-9804"),
-        ("front_track_m = 1.705", "front_track_m = 1705.0", "front_track must be between"),
-        ("front_track_m = 1.705", "front_track = 1.705", "carries no unit"),
-        ("force_std = 0.02", "force_std = 2.0", r"force_std must be in \[0, 1\)"),
-        ("rate_noise_mps", "rate_nose_mps", "is not known"),
+        ("rear_damping_nspm = 9804.0", "", "rear_damping"),
+        ("rear_damping_nspm = 9804.0", "rear_damping_nspm = -9804.0", "rear_damping -9804"),
+        ("front_track_m = 1.705", "front_track_m = 1705.0", "front_track 1705"),
+        ("front_track_m = 1.705", "front_track = 1.705", "front_track front_track_m"),
+        ("force_std = 0.02", "force_std = 2.0", "force_std 2.0"),
+        ("rate_noise_mps", "rate_nose_mps", "rate_nose_mps rate_noise_mps"),
     ],
 )
 def test_faults_are_told_with_their_key(tmp_path, old, new, told):
     path = tmp_path / "truck.toml"
     path.write_text(EXAMPLE.read_text().replace(old, new))
-    with pytest.raises(ConfigError, match=told):
+    with error(ConfigError, told):
         Vehicle.load(path)
 
 
 def test_noise_must_be_possible():
     good = Vehicle.load(EXAMPLE).ride
     assert good is not None
-    with pytest.raises(ConfigError, match="roll_rate_noise must be a positive number"):
+    with error(ConfigError, "roll_rate_noise 0.0"):
         Ride(**{name: getattr(good, name) for name in Ride.__slots__ if name != "roll_rate_noise"},
              roll_rate_noise=0.0)  # fmt: skip

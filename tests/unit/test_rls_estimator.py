@@ -6,9 +6,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from weighbridge import Vehicle
 from weighbridge.estimators.judging import MOTION_STD, consider_std
 from weighbridge.estimators.rls import block_jackknife
-from weighbridge.vehicle.model import Provenance, TorqueModel, Vehicle
+from weighbridge.vehicle.model import Provenance, TorqueModel
 from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
 
 CAR = Vehicle(

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from weighbridge import Drive, Signal, Vehicle
 from weighbridge.checks.needed import needed
-from weighbridge.signals import Drive, Signal
-from weighbridge.vehicle.model import Driveline, Provenance, RoadLoad, TorqueModel, Vehicle
+from weighbridge.vehicle.model import Driveline, Provenance, RoadLoad, TorqueModel
 from weighbridge.vehicle.road import Origin, Value
 
 VAN = Vehicle(kind="van")

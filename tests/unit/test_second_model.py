@@ -10,7 +10,7 @@ import polars as pl
 import pytest
 from numpy.testing import assert_allclose
 
-from weighbridge.io import read_drive
+from weighbridge import read_drive
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "studies"))
 

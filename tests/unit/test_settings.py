@@ -3,10 +3,10 @@
 from dataclasses import replace
 
 import pytest
-from tests.noted import has
+from tests.noted import error, has
 
 import weighbridge as wb
-from weighbridge.errors import ConfigError
+from weighbridge import ConfigError
 from weighbridge.estimators import ESTIMATORS
 from weighbridge.estimators.settings import differences, parsed
 
@@ -28,34 +28,34 @@ def test_settings_within_settings_are_reached_by_dots():
 @pytest.mark.parametrize(
     ("method", "given", "said"),
     [
-        ("joint", {"gate": 0.0}, "gate must be positive, got 0"),
-        ("joint", {"change_std": 2.0}, r"change_std must be in \(0, 1\]"),
-        ("joint", {"settle_windows": 0}, "settle_windows must be 1 or more"),
+        ("joint", {"gate": 0.0}, "0"),
+        ("joint", {"change_std": 2.0}, "change_std 0 1 2"),
+        ("joint", {"settle_windows": 0}, "settle_windows 1 0"),
         (
             "rls",
             {"lambda": 0.99},
-            "no setting 'lambda'; known are fewest_rows, .*, forgetting, initial_mass",
+            "lambda fewest_rows forgetting initial_mass",
         ),
-        ("rls", {"forgetting": 0.5}, r"forgetting must be in \(0.9, 1\], got 0.5"),
-        ("rls", {"forgetting": "fast"}, "forgetting takes a number, got 'fast'"),
-        ("rls", {"settle_rows": 1.5}, "settle_rows takes a whole number, got 1.5"),
-        ("rls", {"gate.inner": 1.0}, "setting gate has none within"),
-        ("hybrid", {"ekf": 3.0}, "ekf takes one of ekf.start.window"),
-        ("hybrid", {"ekf.start.count_grade_twice": 1}, "takes true or false, got 1"),
-        ("hybrid", {"blend": "wind"}, "blend takes one of .*speed.*, got 'wind'"),
-        ("hybrid", {"blend": 1.0}, "blend takes one of .*speed.*, got 1.0"),
-        ("hybrid", {"ekf.start_mass": "speed"}, "takes a number, got 'speed'"),
-        ("speed-ekf", {"process_var": [1.0, 2.0]}, "takes 3 numbers with commas, got list"),
+        ("rls", {"forgetting": 0.5}, "0.9 1 0.5"),
+        ("rls", {"forgetting": "fast"}, "forgetting fast"),
+        ("rls", {"settle_rows": 1.5}, "settle_rows 1.5"),
+        ("rls", {"gate.inner": 1.0}, "gate gate.inner"),
+        ("hybrid", {"ekf": 3.0}, "ekf ekf.start.window 3.0"),
+        ("hybrid", {"ekf.start.count_grade_twice": 1}, "ekf.start.count_grade_twice 1"),
+        ("hybrid", {"blend": "wind"}, "blend speed wind"),
+        ("hybrid", {"blend": 1.0}, "blend speed 1.0"),
+        ("hybrid", {"ekf.start_mass": "speed"}, "ekf.start_mass speed"),
+        ("speed-ekf", {"process_var": [1.0, 2.0]}, "process_var 3 list"),
     ],
 )
 def test_what_cannot_be_set_is_one_sentence(method, given, said):
-    with pytest.raises(ConfigError, match=said):
+    with error(ConfigError, said):
         ESTIMATORS[method].settings_of(given)
 
 
 def test_a_method_without_settings_says_so():
     bare = replace(ESTIMATORS["rls"], settings=None)
-    with pytest.raises(ConfigError, match="method rls has no settings, got gate"):
+    with error(ConfigError, "rls gate"):
         bare.settings_of({"gate": 5.0})
 
 
@@ -72,13 +72,13 @@ def test_texts_are_read_as_toml():
 
 @pytest.mark.parametrize("text", ["forgetting", "=1", "gate=", "gate=5;0", "gate=1\nmass=2"])
 def test_a_text_of_another_form_is_one_sentence(text):
-    with pytest.raises(ConfigError, match=r"write NAME=VALUE|is expected after =") as refused:
+    with error(ConfigError, "=") as refused:
         parsed([text])
     assert "\n" not in str(refused.value)
 
 
 def test_a_name_twice_is_refused():
-    with pytest.raises(ConfigError, match="gate is set twice"):
+    with error(ConfigError, "gate"):
         parsed(["gate=1", "gate=2"])
 
 

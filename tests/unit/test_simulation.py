@@ -6,10 +6,10 @@ import numpy as np
 import polars as pl
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from tests.noted import error
 
+from weighbridge import ConfigError, read_drive
 from weighbridge.cli.simulate import simulate
-from weighbridge.errors import ConfigError
-from weighbridge.io import read_drive
 from weighbridge.signals import QUANTITIES
 from weighbridge.simulation import (
     ABOUT,
@@ -34,10 +34,10 @@ from weighbridge.simulation import (
     random_car,
     random_habits,
     random_vehicle,
+    simulate_car,
     usual_polling,
 )
 from weighbridge.simulation.route import _turn
-from weighbridge.simulation.simulate import simulate_car
 
 
 def short(seed=5, duration=80.0, **changes):
@@ -667,53 +667,56 @@ def test_every_scenario_is_described():
 def test_a_payload_is_checked_against_the_limits_of_its_own_vehicle(name):
     empty = make_scenario(name).car.mass
     assert make_scenario(name, payload=0.6 * empty).mass == pytest.approx(1.6 * empty)
-    with pytest.raises(ConfigError, match=f"car of {empty}"):
+    with error(ConfigError, empty, 2.0 * empty):
         make_scenario(name, payload=2.0 * empty)
 
 
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (lambda: make_scenario("lorry"), "unknown scenario 'lorry'"),
-        (lambda: make_scenario("car-short", without=["squad"]), "unknown effect 'squad'"),
-        (lambda: make_scenario("car-short", mass=1600.0, payload=1.0), "not both"),
-        (lambda: make_scenario("car-short", wind_from=270.0), "wind_from must be in"),
-        (lambda: make_scenario("car-short", mass=10.0), "payload must suit"),
-        (lambda: Effects(squat=-1.0), "effect squat"),
-        (lambda: Effects(squat=float("nan")), "effect squat"),
+        (lambda: make_scenario("lorry"), "lorry"),
+        (lambda: make_scenario("car-short", without=["squad"]), "squad"),
+        (lambda: make_scenario("car-short", mass=1600.0, payload=1.0), ""),
+        (lambda: make_scenario("car-short", wind_from=270.0), "wind_from 270.0"),
+        (lambda: make_scenario("car-short", mass=10.0), "1580.0 -1570.0"),
+        (lambda: Effects(squat=-1.0), "squat"),
+        (lambda: Effects(squat=float("nan")), "squat"),
         (lambda: Sensors(imu_rate=5.0), "imu_rate"),
         (lambda: Sensors(gnss_rate=99.0), "gnss_rate"),
-        (lambda: Polling(rate=0.0), "poll rate"),
+        (lambda: Polling(rate=0.0), "0.2 100 0.0"),
         (lambda: Polling(speed_rounding="up"), "speed_rounding"),
-        (lambda: Polling(fast=()), "at least one"),
-        (lambda: Polling(speed_step=0.0), "speed_step must be positive"),
-        (lambda: Habits(foot_time=(0.5, 0.2)), "foot_time must rise"),
-        (lambda: Habits(touch_rate=-1.0), "touch_rate must be in"),
-        (lambda: Braking(time=5.0, duration=0.0, decel=1.0), "a braking needs"),
+        (lambda: Polling(fast=()), ""),
+        (lambda: Polling(speed_step=0.0), "speed_step 0.0"),
+        (lambda: Habits(foot_time=(0.5, 0.2)), "foot_time 0.5 0.2"),
+        (lambda: Habits(touch_rate=-1.0), "touch_rate -1.0"),
+        (lambda: Braking(time=5.0, duration=0.0, decel=1.0), "5.0 0.0 1.0"),
         (lambda: replace(BUS, launch_gear=9), "launch_gear"),
-        (lambda: random_vehicle(np.random.default_rng(1), "tank"), "kind of vehicle must be"),
+        (lambda: random_vehicle(np.random.default_rng(1), "tank"), "tank truck"),
         (lambda: replace(BUS, transmission="automatic"), "converter_capacity"),
         (lambda: replace(MIDSIZE, gear_ratios=(1.0, 2.0)), "gear_ratios"),
         (lambda: replace(MIDSIZE, mass=-1.0), "mass"),
         (lambda: replace(MIDSIZE, curve_torque=(1.0,)), "curve_speed"),
-        (lambda: flat_route(10.0), "at least 50 m"),
-        (lambda: mixed_route(out=[("city", 500)], back=[("city", 900)]), "as long back as out"),
-        (lambda: short(duration=1.0), "duration"),
-        (lambda: Loading(distance=300.0, duration=1.0, load=10.0), "must last"),
-        (lambda: Loading(distance=300.0, duration=60.0, load=float("nan")), "must be numbers"),
-        (lambda: short(loading=(Loading(distance=9e4, duration=9.0, load=1.0),)), "before the end"),
+        (lambda: flat_route(10.0), "50 11.0"),
+        (lambda: mixed_route(out=[("city", 500)], back=[("city", 900)]), "500 900"),
+        (lambda: short(duration=1.0), "10 1.0"),
+        (lambda: Loading(distance=300.0, duration=1.0, load=10.0), "5 7200 1.0"),
+        (lambda: Loading(distance=300.0, duration=60.0, load=float("nan")), "300.0 nan"),
+        (lambda: short(loading=(Loading(distance=9e4, duration=9.0, load=1.0),)), "8199 90000"),
         (
             lambda: short(
                 loading=tuple(Loading(distance=d, duration=9.0, load=1.0) for d in (900.0, 500.0))
             ),
-            "rise in distance",
+            "8199 900 500",
         ),
-        (lambda: short(loading=(Loading(distance=900.0, duration=9.0, load=4e3),)), "must suit"),
-        (lambda: simulate_car(short(polling=Polling(fast=("altitude",)))), "polled must be"),
+        (
+            lambda: short(loading=(Loading(distance=900.0, duration=9.0, load=4e3),)),
+            "1580.0 4000.0",
+        ),
+        (lambda: simulate_car(short(polling=Polling(fast=("altitude",)))), "altitude"),
     ],
 )
 def test_impossible_scenarios_are_refused(call, words):
-    with pytest.raises(ConfigError, match=words):
+    with error(ConfigError, words):
         call()
 
 

@@ -7,9 +7,9 @@ import pytest
 from numba import config
 
 import weighbridge as wb
+from weighbridge import Signal
 from weighbridge.checks import correct_drive
 from weighbridge.checks.smoothed_imu import check_smoothed
-from weighbridge.signals import Signal
 from weighbridge.signals.catalogue import IMU_SIGNALS
 from weighbridge.simulation import make_scenario, simulate_car
 from weighbridge.vehicle.known import Known, describe

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from weighbridge import Signal
 from weighbridge.navigation.smoothing import GRADE_NOISE, smooth_grade, smooth_height, smooth_speed
-from weighbridge.signals import Signal
 
 
 def gauss_markov(rng, step, length, std, n):

@@ -8,14 +8,15 @@ from numpy.testing import assert_allclose
 from tests.noted import refused
 
 import weighbridge as wb
+from weighbridge import Drive, Signal, Vehicle
 from weighbridge.balance import force_balance
 from weighbridge.constants import GRAVITY
 from weighbridge.estimators.judging import Evidence
 from weighbridge.messages import phrase
 from weighbridge.navigation.select import find_motion
 from weighbridge.navigation.speed import speed_motion
-from weighbridge.signals import QUANTITIES, Drive, Signal
-from weighbridge.vehicle.model import Driveline, Vehicle
+from weighbridge.signals import QUANTITIES
+from weighbridge.vehicle.model import Driveline
 
 TIME = np.arange(0.0, 200.0, 0.25)
 W = 2.0 * np.pi / 40.0

@@ -6,14 +6,14 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from tests.noted import error
 
 import weighbridge as wb
+from weighbridge import ConfigError, Drive, Signal, Vehicle
 from weighbridge.balance import Reason
-from weighbridge.errors import ConfigError
 from weighbridge.estimators import ESTIMATORS, speed_torque_ekf
 from weighbridge.estimators.speed_samples import covered, sampled, span_means
-from weighbridge.signals import Drive, Signal
-from weighbridge.vehicle.model import Driveline, RoadLoad, Timing, TorqueModel, Vehicle
+from weighbridge.vehicle.model import Driveline, RoadLoad, Timing, TorqueModel
 
 METHOD = "speed-torque-ekf"
 MASS = 1400.0
@@ -204,15 +204,15 @@ def test_residual_reason_and_running_mass_are_of_the_rows(weighed):
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        ({"initial_mass": -1.0}, "initial_mass must be a positive number, got -1"),
-        ({"sample_time": 60.0}, "sample_time must be 30 s or less"),
-        ({"gate": 0.0}, "gate must be positive"),
-        ({"slope_walk": -0.1}, "slope_walk must be zero or positive"),
-        ({"measured_grade": 1.0}, "takes true or false"),
+        ({"initial_mass": -1.0}, "initial_mass -1.0"),
+        ({"sample_time": 60.0}, "sample_time 30 60.0"),
+        ({"gate": 0.0}, "gate 0.0"),
+        ({"slope_walk": -0.1}, "slope_walk -0.1"),
+        ({"measured_grade": 1.0}, "measured_grade 1.0"),
     ],
 )
 def test_what_cannot_be_set_is_one_sentence(given, said):
-    with pytest.raises(ConfigError, match=said):
+    with error(ConfigError, said):
         ESTIMATORS[METHOD].settings_of(given)
 
 

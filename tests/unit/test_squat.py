@@ -8,6 +8,7 @@ from numpy.testing import assert_allclose
 from scipy.ndimage import uniform_filter1d
 
 import weighbridge as wb
+from weighbridge import Drive, Signal
 from weighbridge.constants import GRAVITY
 from weighbridge.estimators import joint
 from weighbridge.estimators.squat import (
@@ -23,7 +24,6 @@ from weighbridge.estimators.squat import (
 from weighbridge.navigation.inertial import inertial_motion
 from weighbridge.navigation.longitudinal import longitudinal_motion
 from weighbridge.navigation.motion import with_squat
-from weighbridge.signals import Drive, Signal
 from weighbridge.simulation import (
     MIDSIZE,
     Scenario,

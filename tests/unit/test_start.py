@@ -3,12 +3,11 @@
 import numpy as np
 import pytest
 
-from weighbridge.errors import DriveError
+from weighbridge import DriveError, Signal
 from weighbridge.kernels.ins_model import P, Q, V
 from weighbridge.navigation.filter import run
 from weighbridge.navigation.identify.start import heading_of, turned
 from weighbridge.navigation.select import find_motion, identify_motion
-from weighbridge.signals import Signal
 
 FIXES = ("latitude", "longitude", "altitude")
 LENGTH = 200.0

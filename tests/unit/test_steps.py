@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 from tests.noted import refused
 
+from weighbridge import Signal, Vehicle, weigh
 from weighbridge.balance.disagreement import Finding
 from weighbridge.checks.steps import check_steps, reading_step
 from weighbridge.messages import phrase
-from weighbridge.pipeline.weighing import weigh
-from weighbridge.signals import Signal
 from weighbridge.simulation import make_scenario, simulate_car
-from weighbridge.vehicle.model import TorqueModel, Vehicle
+from weighbridge.vehicle.model import TorqueModel
 
 POUND_FOOT = 9.80665 * 0.45359237 * 0.3048
 

@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from tests.unit.test_j1939 import frames
 
-from weighbridge.errors import ConfigError
+from weighbridge import ConfigError
 from weighbridge.io.bus import decode
 from weighbridge.io.dbc import load_dbcs
 from weighbridge.io.frame_text import read_candump

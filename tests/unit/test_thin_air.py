@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import weighbridge as wb
-from weighbridge.signals import Signal
+from weighbridge import Signal
 from weighbridge.simulation import Sensors, make_scenario, simulate_car
 from weighbridge.vehicle.air import Air, identify_air, standard_pressure
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from weighbridge import weigh
 from weighbridge.estimators.torque_shape import (
     KNOTS,
     ORDINARY,
@@ -10,7 +11,6 @@ from weighbridge.estimators.torque_shape import (
     shape_columns,
     shape_std,
 )
-from weighbridge.pipeline.weighing import weigh
 
 MASS = 1600.0
 

@@ -13,14 +13,14 @@ from asammdf import MDF
 from mcap.reader import make_reader
 from mcap.writer import Writer
 from scipy.stats import t as student
+from tests.noted import error
 from tests.unit.test_balance import CAR
 from tests.unit.test_weighing import weighing
 
+from weighbridge import ConfigError, Drive, MissingExtraError, Signal, Weighing, read_drive
 from weighbridge.cli.results import asked_for, inputs, refuse_results
-from weighbridge.errors import ConfigError, MissingExtraError
-from weighbridge.io import read_drive, write_mdf
-from weighbridge.pipeline.weighing import Weighing
-from weighbridge.signals import QUANTITIES, Drive, Signal
+from weighbridge.io import write_mdf
+from weighbridge.signals import QUANTITIES
 from weighbridge.signals.units import to_si
 
 
@@ -155,7 +155,7 @@ def test_the_command_replaces_an_earlier_track_and_no_recording(weighed, tmp_pat
             writer.finish()
     else:
         write_mdf(weighed.drive, recording)
-    with pytest.raises(ConfigError, match="is no track"):
+    with error(ConfigError, "track --track"):
         refuse_results(inputs(), asked_for(track=recording))
     recording.write_bytes(b"")
     refuse_results(inputs(), asked_for(track=recording))
@@ -165,5 +165,5 @@ def test_the_command_replaces_no_layout_of_others(weighed, tmp_path):
     track = tmp_path / "track.mcap"
     weighed.write_track(track)
     (tmp_path / "track.mcap.plotjuggler.xml").write_text("<root/>")
-    with pytest.raises(ConfigError, match="is no layout"):
+    with error(ConfigError, "track.mcap.plotjuggler.xml layout --track"):
         refuse_results(inputs(), asked_for(track=track))

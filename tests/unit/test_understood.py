@@ -4,7 +4,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from tests.noted import refused
 
-from weighbridge.io import read_drive
+from weighbridge import read_drive
 from weighbridge.io.frame_text import read_asc, read_candump, read_crtd, read_frame_table, read_trc
 from weighbridge.io.understood import strange_rows
 

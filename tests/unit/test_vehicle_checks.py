@@ -6,13 +6,11 @@ import numpy as np
 import pytest
 from tests.noted import refused, says
 
-from weighbridge import CalibrationSettings, calibrate
+from weighbridge import CalibrationSettings, Drive, DriveError, Signal, Vehicle, calibrate
 from weighbridge.checks import check_drive
 from weighbridge.checks.vehicle import check_vehicle
-from weighbridge.errors import DriveError
 from weighbridge.messages import phrase
-from weighbridge.signals import Drive, Signal
-from weighbridge.vehicle.model import Driveline, Provenance, TorqueModel, Vehicle
+from weighbridge.vehicle.model import Driveline, Provenance, TorqueModel
 from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
 
 SMALL = (42.6, 21.96, 14.04, 9.708, 7.634, 6.315)

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.noted import error
 
-from weighbridge.errors import ConfigError
+from weighbridge import ConfigError, Vehicle
 from weighbridge.estimators.considered import pinned
 from weighbridge.vehicle.file import save_vehicle
 from weighbridge.vehicle.model import (
@@ -24,7 +25,6 @@ from weighbridge.vehicle.model import (
     SpeedModel,
     Timing,
     TorqueModel,
-    Vehicle,
 )
 from weighbridge.vehicle.rounding import covariance_texts
 from weighbridge.visible import visible
@@ -357,57 +357,56 @@ def test_all_mistakes_are_told_at_once(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("content", "line", "words"),
+    ("content", "line", "values"),
     [
-        ("[vehicle]\ntara_kg = 1500", 2, "did you mean tare_kg"),
-        ("[vehicle]\ntare = 1500", 2, "no unit; write it as tare_kg"),
-        ("[vehicle]\ntare_m = 1500", 2, "is not known"),
-        ("[vehicle]\ntare_kg = -3", 2, "must be a positive number"),
-        ("[vehicle]\ntare_kg = nan", 2, "must be a finite number"),
-        ("[vehicle]\ntare_kg = '1500'", 2, "must be a number, not text (1500)"),
-        ("[vehicle]\ntare_kg = 1500\ntare_t = 1.5", 3, "says the same as tare_kg"),
-        ("[vehicle]\nclass = 'boat'", 2, "class must be"),
-        ("[vehicle]\nname = 3", 2, 'text in "quotes"'),
-        ("\n[driveline]\n\nefficiency = 1.2", 4, "must be in (0, 1]"),
-        ("[driveline]\ngearings_per_m = [10, 20]", 2, "must fall from first to last"),
-        ("[driveline]\ngearings_per_m = 10", 2, "must be a list of numbers"),
-        ("[driveline]\ngear_ratios = [3, 2]", 2, "needs wheel_radius_m"),
-        ("[driveline]\nfinal_drive = 4.0", 2, "needs gear_ratios"),
-        ("[driveline]\ngear_ratios = [1, 2]\nwheel_radius_m = 0.3", 2, "must fall"),
-        ("[driveline]\nspeed_scale = 2", 2, "must be in [0.8, 1.2]"),
-        ("[torque]\nsource = 'magic'", 2, "load, air_flow or battery"),
-        ("[torque]\nsource = 'load'\ncoefficients = [1.0]", 3, "at least two coefficients"),
-        ("[torque]\nload_range_pct = [50, 10]", 2, "the lower first"),
-        ("[road_load]\ndrag_coefficient = 0.3", 2, "needs frontal_area_m2"),
-        ("[road_load]\nrolling_coefficient = 0.9", 2, "must be in [0, 0.1)"),
-        ("[road_load]\nrolling_speed_coefficient_s_per_m = 0.9", 2, "must be in [0, 0.002) s/m"),
-        ("[mounting]\nstd_deg = [1, 2]", 2, "must be three numbers"),
-        ("[timing]\ntorque_delay_s = 120", 2, "must be in [-1, 3] s"),
-        (DRAGGED + "\nlevel = [0.1]", 2, "level must be as many as engine_speed, 2, got 1"),
-        (DRAGGED + "\nlevel = []", 5, "one number at least"),
-        (DRAGGED.replace("2000", "700") + "\nlevel = [1, 2]", 2, "engine_speed must rise"),
-        ("[dragged]\nspan = 1.0", 1, "lacks"),
-        (WITNESS, 1, "lacks coefficients; calibrate writes"),
-        (WITNESS + "\ncoefficients = [1, 2]", 7, "must be 4 numbers for mass_air_flow, got 2"),
-        (WITNESS + "\ncoefficients = [0, 1, 0, 0]\nblur = 1", 8, "no unit"),
-        (WITNESS.replace("0.1, 1.0", "1.0, 0.1"), 5, "the lower first"),
-        (WITNESS.replace("air_flow", "air_flwo"), 1, "did you mean mass_air_flow"),
-        ("[provenance]\nformat_version = 99", 2, "reads version 1"),
-        ("[provenance]\nsamples = 1.5", 2, "a whole number"),
-        ("[speed_model]\nmass_kg = 1092", 1, "lacks force_gain_per_m, drag_kg_per_m, rotating_"),
-        (SPEED_MODEL + "\ncorrections = [1, 2]", 7, "seven numbers, p1 to p7"),
-        ("[roadload]\n", 1, "did you mean road_load"),
-        ("vehicle = 3", 1, "must be a section"),
+        ("[vehicle]\ntara_kg = 1500", 2, "tara_kg tare_kg"),
+        ("[vehicle]\ntare = 1500", 2, "tare tare_kg"),
+        ("[vehicle]\ntare_m = 1500", 2, "tare_m"),
+        ("[vehicle]\ntare_kg = -3", 2, "tare_kg -3"),
+        ("[vehicle]\ntare_kg = nan", 2, "tare_kg NaN"),
+        ("[vehicle]\ntare_kg = '1500'", 2, "tare_kg 1500"),
+        ("[vehicle]\ntare_kg = 1500\ntare_t = 1.5", 3, "tare_t tare_kg"),
+        ("[vehicle]\nclass = 'boat'", 2, "boat truck"),
+        ("[vehicle]\nname = 3", 2, 'name 3 "'),
+        ("\n[driveline]\n\nefficiency = 1.2", 4, "efficiency 1.2"),
+        ("[driveline]\ngearings_per_m = [10, 20]", 2, "gearings_per_m 10 20"),
+        ("[driveline]\ngearings_per_m = 10", 2, "gearings_per_m 10"),
+        ("[driveline]\ngear_ratios = [3, 2]", 2, "gear_ratios wheel_radius_m"),
+        ("[driveline]\nfinal_drive = 4.0", 2, "final_drive gear_ratios"),
+        ("[driveline]\ngear_ratios = [1, 2]\nwheel_radius_m = 0.3", 2, "gear_ratios 1.0 2.0"),
+        ("[driveline]\nspeed_scale = 2", 2, "speed_scale 2"),
+        ("[torque]\nsource = 'magic'", 2, "magic air_flow battery"),
+        ("[torque]\nsource = 'load'\ncoefficients = [1.0]", 3, "torque.coefficients load 1.0"),
+        ("[torque]\nload_range_pct = [50, 10]", 2, "load_range_pct"),
+        ("[road_load]\ndrag_coefficient = 0.3", 2, "drag_coefficient frontal_area_m2"),
+        ("[road_load]\nrolling_coefficient = 0.9", 2, "rolling_coefficient 0.9"),
+        (
+            "[road_load]\nrolling_speed_coefficient_s_per_m = 0.9",
+            2,
+            "rolling_speed_coefficient_s_per_m 0.9",
+        ),
+        ("[mounting]\nstd_deg = [1, 2]", 2, "std_deg 2"),
+        ("[timing]\ntorque_delay_s = 120", 2, "torque_delay_s 120"),
+        (DRAGGED + "\nlevel = [0.1]", 2, "level engine_speed 2 1"),
+        (DRAGGED + "\nlevel = []", 5, "dragged.level []"),
+        (DRAGGED.replace("2000", "700") + "\nlevel = [1, 2]", 2, "engine_speed_rpm 900 700"),
+        ("[dragged]\nspan = 1.0", 1, "dragged"),
+        (WITNESS, 1, "mass_air_flow coefficients"),
+        (WITNESS + "\ncoefficients = [1, 2]", 7, "mass_air_flow.coefficients 4 2"),
+        (WITNESS + "\ncoefficients = [0, 1, 0, 0]\nblur = 1", 8, "blur blur_s"),
+        (WITNESS.replace("0.1, 1.0", "1.0, 0.1"), 5, "value_range"),
+        (WITNESS.replace("air_flow", "air_flwo"), 1, "mass_air_flwo mass_air_flow"),
+        ("[provenance]\nformat_version = 99", 2, "format_version 99 1"),
+        ("[provenance]\nsamples = 1.5", 2, "samples 1.5"),
+        ("[speed_model]\nmass_kg = 1092", 1, "speed_model force_gain_per_m drag_kg_per_m"),
+        (SPEED_MODEL + "\ncorrections = [1, 2]", 7, "corrections p1 p7 2"),
+        ("[roadload]\n", 1, "roadload road_load"),
+        ("vehicle = 3", 1, "vehicle"),
     ],
 )
-def test_mistakes_are_told_with_file_line_and_remedy(tmp_path, content, line, words):
-    with pytest.raises(ConfigError) as caught:
+def test_mistakes_are_told_with_file_line_and_remedy(tmp_path, content, line, values):
+    with error(ConfigError, "car.toml", line, values):
         load(tmp_path, content)
-    message = str(caught.value)
-    assert "car.toml" in message
-    assert f"line {line}:" in message
-    assert words in message
-    assert "\n" not in message
 
 
 def test_broken_toml_is_told(tmp_path):

@@ -7,9 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from weighbridge.errors import DriveError
-from weighbridge.io import read_drive
-from weighbridge.signals import Problem
+from weighbridge import DriveError, Problem, read_drive
 from weighbridge.visible import (
     LONGEST,
     cut,

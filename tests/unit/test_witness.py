@@ -7,17 +7,17 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.signal import lfilter
-from tests.noted import refused
+from tests.noted import error, refused
 
 import weighbridge as wb
+from weighbridge import Drive, DriveInfo, Signal, Vehicle
 from weighbridge.balance.disagreement import accepted_scales, findings
 from weighbridge.balance.second_signal import BY_SIGNAL, compare, rows_of
 from weighbridge.balance.second_signal_learning import learn_second_signals
 from weighbridge.checks.second_signals import check_reading, check_second_signals
 from weighbridge.estimators import ESTIMATORS
 from weighbridge.messages import phrase
-from weighbridge.signals import Drive, DriveInfo, Signal
-from weighbridge.vehicle.model import Driveline, SecondSignalRelation, TorqueModel, Vehicle
+from weighbridge.vehicle.model import Driveline, SecondSignalRelation, TorqueModel
 
 END = 1500.0
 MIDDLE = 0.5 * END
@@ -392,14 +392,14 @@ def test_rows_need_a_reference_torque_to_be_a_torque():
 def test_a_relation_is_one_of_a_known_signal():
     good = learnt("mass_air_flow").witnesses[0]
     for fields, words in (
-        ({"signal": "throttle"}, "signal must be"),
-        ({"coefficients": (1.0, 2.0)}, "must be 4 numbers"),
-        ({"span": 0.0}, "span must be a positive"),
-        ({"blur": -1.0}, "blur must be zero or positive"),
+        ({"signal": "throttle"}, "signal throttle"),
+        ({"coefficients": (1.0, 2.0)}, "4 mass_air_flow 2"),
+        ({"span": 0.0}, "span 0.0"),
+        ({"blur": -1.0}, "blur -1.0"),
     ):
-        with pytest.raises(wb.ConfigError, match=words):
+        with error(wb.ConfigError, words):
             replace(good, **fields)
-    with pytest.raises(wb.ConfigError, match="may be named once"):
+    with error(wb.ConfigError, "mass_air_flow"):
         replace(CAR, witnesses=(good, good))
     assert isinstance(good, SecondSignalRelation)
 
