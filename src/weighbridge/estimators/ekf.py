@@ -220,7 +220,7 @@ def estimate(
         valid,
         rls_params,
     )
-    fit = robust_rls.window_fit(table.time, mean_phi, mean_y, rls_params)
+    fit = robust_rls.window_fit(balance, mean_phi, mean_y, rls_params, settings.start)
     params = parameters(settings, vehicle, robust_rls.row_period(table.time))
     rows = columns(balance, vehicle, valid, settings)
     informed = np.flatnonzero(information * rls_params.window >= settings.start.first_information)

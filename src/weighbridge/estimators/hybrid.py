@@ -135,7 +135,7 @@ def estimate(
     begin = robust_rls.initial_state(settings.ekf.start, params.rls.window)
     start = kernel.initial_state(begin, params)  # type: ignore[no-untyped-call]
     _, mass, var, share, _, _, mean_phi, mean_y, _, _ = kernel.run(start, rows, phi, y, params)
-    fit = robust_rls.window_fit(table.time, mean_phi, mean_y, params.rls)
+    fit = robust_rls.window_fit(balance, mean_phi, mean_y, params.rls, settings.ekf.start)
     row_reason = robust_rls.window_reason(table, valid, mean_phi)
     counted = np.where(row_reason == 0, np.nan_to_num(phi) ** 2, 0.0)
 

@@ -44,6 +44,7 @@ PRINTED: Final = hybrid.HybridSettings(
             forgetting=0.999,
             kept_information=0.0,
             offset_std=0.0,
+            noisy_motion=False,
             weight_information=False,
             every_row=True,
             rolling_coefficient=0.0005,
