@@ -167,7 +167,7 @@ def test_the_noise_of_the_motion_that_is_known_does_not_draw_the_final_mass_down
         made = balance(minutes=12.0, seed=seed)
         noise = 0.5 * np.random.default_rng(40 + seed).normal(size=made.table.time.size)
         table = replace(made.table, specific_force=made.table.specific_force + noise)
-        # What the motion says of one sample: windows of ten rows keep five sixteenths of its square.
+        # What the motion says of one sample: of its square, windows keep five sixteenths.
         made.motion.specific_force_std = 0.5 / np.sqrt(10.0 * 0.3125)
         for allowed, masses in found.items():
             settings = robust_rls.RobustRlsSettings(noisy_motion=allowed)

@@ -11,7 +11,8 @@ LEAST_SQUARES = (
     "memory=30", "forgetting=0.999", "window=0", "kept_information=0", "threshold=0.5",
     "weight_information=false", "start_mass=900 start_information=3", "rolling_coefficient=0.0005",
     "threshold_force=50", "settle_windows=0 threshold=0.5", "every_row=true",
-    "offset_std=0", "noisy_motion=false", "count_grade_twice=true", "first_information=3", "offset_memory=20",
+    "offset_std=0", "noisy_motion=false", "count_grade_twice=true", "first_information=3",
+    "offset_memory=20",
 )  # fmt: skip
 KALMAN = (
     "start_mass=900", "start_std=0.1", "speed_noise=0.03", "grade_noise=0.02", "accel_walk=0.3",

@@ -440,7 +440,9 @@ def finish(
     mass = fitted if final is None else final(slice(0, table.time.size))
     slow = consider_std(balance, phi, used, vehicle)
     index = np.maximum(np.searchsorted(table.time, fit.time, side="right") - 1, 0)
-    weighed = Fitted(mass=mass, scatter=scatter, blocks=blocks, index=index, influence=fit.influence)
+    weighed = Fitted(
+        mass=mass, scatter=scatter, blocks=blocks, index=index, influence=fit.influence
+    )
     found = judged(balance, vehicle, used, phi, weighed, slow, noise_share, gate)
     # A running mass that forgets is that of a stretch of time.
     passing = np.hypot(slow, UNMODELLED_STD)
