@@ -25,6 +25,7 @@ from weighbridge.estimators.judging import (
     nothing,
     segments,
 )
+from weighbridge.estimators.noisy_motion import USUAL_STD
 from weighbridge.estimators.regression import regression
 from weighbridge.estimators.track import MassTrack
 from weighbridge.kernels import robust_rls as kernel
@@ -33,7 +34,7 @@ from weighbridge.signals.robust import huber, spread
 from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.possible import not_negative, positive, within
 
-NOISE_SHARE: Final = 1.5
+NOISE_SHARE: Final = 0.75
 """What noise of the motion costs, see `weighbridge.estimators.noisy_motion.row_noise_std` [-]."""
 
 DEPENDENCE: Final = 5.0
@@ -317,6 +318,14 @@ class WindowFit:
         determinant = power * (count + ridge) - first**2
         return np.asarray(weight * ((count + ridge) * self.phi - first) / determinant)
 
+    @property
+    def attenuation(self) -> float:
+        """What noise of the motion would take from the mass, and the fit does not let it [-]."""
+        _, _, weight, ridge = self._huber(self.phi, self.y)
+        power, first, count, _, _ = self._sums(self.phi, self.y, weight)
+        known = power - first**2 / (count + ridge)
+        return float(self.motion_var * count / known) if known > 0.0 else float("inf")
+
     def _sums(self, phi: Floats, y: Floats, weight: Floats, block: Ints | None = None) -> Floats:
         """Weighted sums of phi^2 without its noise, phi, 1, phi y and y: (5,), or (5, blocks)."""
         power = phi * phi - self.motion_var
@@ -441,7 +450,12 @@ def finish(
     slow = consider_std(balance, phi, used, vehicle)
     index = np.maximum(np.searchsorted(table.time, fit.time, side="right") - 1, 0)
     weighed = Fitted(
-        mass=mass, scatter=scatter, blocks=blocks, index=index, influence=fit.influence
+        mass=mass,
+        scatter=scatter,
+        blocks=blocks,
+        index=index,
+        influence=fit.influence,
+        noise_std=USUAL_STD * fit.attenuation if final is None else 0.0,
     )
     found = judged(balance, vehicle, used, phi, weighed, slow, noise_share, gate)
     # A running mass that forgets is that of a stretch of time.
