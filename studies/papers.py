@@ -42,6 +42,15 @@ METHODS = {
     "ekf": "ekf (Du)",
     "speed-torque-ekf": "speed-torque-ekf (Galvão)",
 }
+FELL_SHORT = (
+    "`speed-torque-ekf` misses 3 % by its heights and by speeds alone: of six other vehicles, 30",
+    "drives are 4.7 % off (RMS) by heights, and 3.4 % with the true grade.",
+    "Intervals of `robust-rls`, `ekf` and `hybrid` hold more often than 95 %: they allow for slow",
+    "errors of usual size. With noise of 0.7 m/s² on every axis, the (error/std)² of `robust-rls`",
+    "is 0.8.",
+)
+"""What misses its goal, and the evidence why."""
+
 TIME = ("computing time",)
 """Rows that no two runs have alike."""
 
@@ -98,6 +107,8 @@ def second_model() -> str:
         "drives of known mass.",
         "",
         *table(found),
+        *FELL_SHORT,
+        "",
     ])  # fmt: skip
 
 

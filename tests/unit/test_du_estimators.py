@@ -361,3 +361,14 @@ def test_every_blend_lies_between_both_filters(blend):
 def test_impossible_settings_are_refused(settings, bad, said):
     with pytest.raises(ConfigError, match=said):
         settings(**bad)
+
+
+def test_the_final_mass_of_the_hybrid_is_the_mean_of_both_parts():
+    made = balance(minutes=10.0, seed=4)
+    rng = np.random.default_rng(9)
+    table = made.table
+    shocks = lfilter([900.0], [1.0, -0.7], rng.normal(size=table.time.size))
+    made = replace(made, table=replace(table, traction_force=table.traction_force + shocks))
+    masses = [ESTIMATORS[m].track(made, BUS).mass for m in ("robust-rls", "ekf", "hybrid")]
+    assert abs(masses[1] - masses[0]) > 1.0
+    assert masses[2] == pytest.approx(0.5 * (masses[0] + masses[1]), rel=1e-6)

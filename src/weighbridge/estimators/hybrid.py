@@ -115,7 +115,8 @@ def estimate(
     """Weigh by both filters and blend their masses.
 
     The final answer blends the final answers of both, by the mean share over
-    the rows, each counted with what it says of the mass.
+    the rows, each counted with what it says of the mass. With ``innovations`` it
+    is their mean: both have seen every row, and their errors are alike.
 
     Parameters
     ----------
@@ -124,7 +125,8 @@ def estimate(
 
     References
     ----------
-    Du et al. 2025, eq. 34.
+    Du et al. 2025, eq. 34. Equal weights of alike estimates: Bates and Granger, Operational
+    Research Quarterly 20, 1969.
     """
     settings = settings or HybridSettings()
     balance, vehicle = robust_rls.as_set(balance, vehicle, settings.ekf.start)
@@ -144,6 +146,8 @@ def estimate(
         if not weight.sum() > 0.0:
             return float("nan")
         mean_share = float(np.average(share[chosen], weights=weight))
+        if Blend(settings.blend) is Blend.INNOVATIONS:
+            mean_share = 0.5
         time = table.time[chosen]
         fitted = fit.mass(float(time[0]), float(time[-1]))[0]
         filtered = ekf.constant_mass(rows, chosen, fit.mass()[0], params.ekf)
