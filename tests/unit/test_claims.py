@@ -1,5 +1,6 @@
 """Items of the papers, the rows that a run makes of them, and the page of the rows."""
 
+import json
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -10,12 +11,35 @@ from tests.noted import error
 
 from weighbridge import ConfigError
 from weighbridge.estimators.settings import changed, differences, parsed
-from weighbridge.papers import PAPERS, Item, Verdict, items_of, settings_of
-from weighbridge.papers.claims import EXACT, Conditions, Found, Section, document, same
+from weighbridge.papers import (
+    PAPERS,
+    du2025,
+    du2025_bus,
+    galvao,
+    galvao_figures,
+    items_of,
+    jensen2022,
+    jensen2022_found,
+    jensen2022_printed,
+    nguyen2024,
+    settings_of,
+)
+from weighbridge.papers.claims import (
+    EXACT,
+    Conditions,
+    Found,
+    Item,
+    Section,
+    Verdict,
+    document,
+    same,
+)
 from weighbridge.papers.du2025_equations import equations as du2025_equations
 from weighbridge.papers.galvao_equations import equations as galvao_equations
+from weighbridge.papers.jensen2022_drives import without_weather
 from weighbridge.papers.jensen2022_equations import equations as jensen2022_equations
 from weighbridge.papers.nguyen2024_equations import equations as nguyen2024_equations
+from weighbridge.simulation import make_scenario, simulate_car
 
 PAGE = Path(__file__).parents[2] / "docs" / "papers.md"
 
@@ -141,8 +165,7 @@ PAPER_TITLES = {
 @pytest.mark.parametrize("paper", PAPERS)
 def test_the_page_has_the_rows_of_today(paper, equations):
     """`python studies/papers.py --check` compares every figure; here those that are quick."""
-    whole = PAGE.read_text(encoding="utf-8").split(f"\n## {PAPER_TITLES[paper]}\n")[1]
-    page = whole.split("\n## ")[0]
+    page = part_of_the_page(paper)
     exact = re.findall(r"^- (.*)$", page, re.MULTILINE)
     blank = {i: Found("", agrees=True) for item in items_of(paper) for i in item.names}
     for item in items_of(paper):
@@ -156,6 +179,11 @@ def test_the_page_has_the_rows_of_today(paper, equations):
         else:
             assert line_of(page, row.label, *row.figures), row.label
             assert all(reason in page for reason in row.reasons if row.verdict == "differs")
+
+
+def part_of_the_page(paper):
+    whole = PAGE.read_text(encoding="utf-8").split(f"\n## {PAPER_TITLES[paper]}\n")[1]
+    return whole.split("\n## ")[0]
 
 
 def line_of(page, label, *figures):
@@ -185,3 +213,76 @@ def test_a_page_says_a_reason_once():
     page = document([Section(title="A paper", note="seeds 5 to 6", rows=rows)])
     assert page.count("one reason") == page.count("`weighbridge reproduce galvao`") == 1
     assert page.count("|1,2,3|") == 1
+
+
+def fresh_du2025():
+    seeds = range(du2025.SEED, du2025.SEED + du2025.DRIVES)
+    buses = [du2025_bus.simulate(3000.0, seed, as_paper=True) for seed in seeds]
+    drives = [du2025.judge("half-load", bus, du2025_bus.known_bus()) for bus in buses]
+    return du2025.our_rmse(drives, "ours")
+
+
+def fresh_galvao():
+    return galvao_figures.of_tests(galvao.weigh_three(galvao.SEED)[2])
+
+
+def fresh_jensen2022():
+    made = simulate_car(make_scenario("car-calibration", seed=jensen2022.SEED))
+    mass = float(np.mean(made.truth.mass))
+    printed = jensen2022.Settings().printed
+    car = jensen2022_printed.train(without_weather(made.drive), mass, printed)
+    return jensen2022_found.of_fit("printed", car.vehicle, car.r_squared)
+
+
+def fresh_nguyen2024():
+    case = nguyen2024.EXTENDED
+    roads = nguyen2024.reproduce(cases=(case,))[0][case.name]
+    return {f"{name} extended": f for name, f in nguyen2024.followed(roads).items()}
+
+
+FRESH = {
+    "du2025": fresh_du2025,
+    "galvao": fresh_galvao,
+    "jensen2022": fresh_jensen2022,
+    "nguyen2024": fresh_nguyen2024,
+}
+
+
+@pytest.mark.parametrize("paper", PAPERS)
+def test_rows_of_the_page_are_those_of_a_fresh_run(paper):
+    """Rows that take seconds; `python studies/papers.py --check` compares all."""
+    page, found = part_of_the_page(paper), FRESH[paper]()
+    rows = [i.row(paper, found) for i in items_of(paper) if i.ours and set(i.names) <= set(found)]
+    assert len(rows) >= 3
+    assert [r.name for r in rows if not line_of(page, r.label, *r.figures)] == []
+
+
+def commands():
+    """Commands beside the rows of the page that differ, each once."""
+    text = PAGE.read_text(encoding="utf-8")
+    return list(dict.fromkeys(re.findall(r"^\d+\. `(weighbridge [^`]+)`", text, re.MULTILINE)))
+
+
+def test_every_command_of_the_page_is_accepted():
+    assert len(commands()) > 20
+    for command in commands():
+        _, _, paper, *options = command.split()
+        given = changed(settings_of(paper)(), parsed(options[1::2]))
+        assert not options or differences(given), command
+
+
+def test_a_command_of_the_page_runs(weighbridge, monkeypatch, tmp_path):
+    """The first of Nguyen 2024, on one road; all run with `pytest --long`."""
+    monkeypatch.setitem(nguyen2024.reproduce.__kwdefaults__, "roads", 1)
+    first = next(c for c in commands() if c.split()[2] == "nguyen2024")
+    file = tmp_path / "rows.json"
+    assert weighbridge(*first.split()[1:], "--json", file).code in (0, 1)
+    rows = json.loads(file.read_text(encoding="utf-8"))["rows"]
+    assert len(rows) == len(items_of("nguyen2024"))
+
+
+def test_every_command_of_the_page_runs(weighbridge, tmp_path):
+    for k, command in enumerate(commands()):
+        file = tmp_path / f"rows-{k}.json"
+        assert weighbridge(*command.split()[1:], "--json", file).code in (0, 1), command
+        assert json.loads(file.read_text(encoding="utf-8"))["rows"], command

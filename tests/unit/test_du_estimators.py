@@ -70,7 +70,11 @@ def balance(mass=10_000.0, *, seed=1, minutes=6.0, grade=0.01, swing=1.0, offset
         reason=reason,
     )
     motion = SimpleNamespace(
-        source="inertial", unmeasured_grade=0.0, recorded_speed=None, specific_force_scale_std=0.0
+        source="inertial",
+        unmeasured_grade=0.0,
+        recorded_speed=None,
+        specific_force_scale_std=0.0,
+        specific_force_std=0.02,
     )
     return ForceBalance(motion=motion, table=table)
 
@@ -155,6 +159,21 @@ def test_noise_of_force_draws_up_and_noise_of_the_motion_down_but_not_at_their_m
     assert by_model > 1.08
     assert abs(by_mean - 1.0) < 0.015
     assert by_rows < by_mean - 0.004
+
+
+def test_the_noise_of_the_motion_that_is_known_does_not_draw_the_final_mass_down():
+    found = {True: [], False: []}
+    for seed in range(3):
+        made = balance(minutes=12.0, seed=seed)
+        noise = 0.5 * np.random.default_rng(40 + seed).normal(size=made.table.time.size)
+        table = replace(made.table, specific_force=made.table.specific_force + noise)
+        # What the motion says of one sample: of its square, windows keep five sixteenths.
+        made.motion.specific_force_std = 0.5 / np.sqrt(10.0 * 0.3125)
+        for allowed, masses in found.items():
+            settings = robust_rls.RobustRlsSettings(noisy_motion=allowed)
+            masses.append(robust_rls.estimate(replace(made, table=table), BUS, settings).mass)
+    assert abs(np.mean(found[True]) / 10_000.0 - 1.0) < 0.01
+    assert np.mean(found[False]) < 9500.0
 
 
 def filtered(made, settings):
@@ -342,3 +361,14 @@ def test_every_blend_lies_between_both_filters(blend):
 def test_impossible_settings_are_refused(settings, bad, said):
     with error(ConfigError, said):
         settings(**bad)
+
+
+def test_the_final_mass_of_the_hybrid_is_the_mean_of_both_parts():
+    made = balance(minutes=10.0, seed=4)
+    rng = np.random.default_rng(9)
+    table = made.table
+    shocks = lfilter([900.0], [1.0, -0.7], rng.normal(size=table.time.size))
+    made = replace(made, table=replace(table, traction_force=table.traction_force + shocks))
+    masses = [ESTIMATORS[m].track(made, BUS).mass for m in ("robust-rls", "ekf", "hybrid")]
+    assert abs(masses[1] - masses[0]) > 1.0
+    assert masses[2] == pytest.approx(0.5 * (masses[0] + masses[1]), rel=1e-6)

@@ -137,6 +137,8 @@ def test_settings_reach_the_cases_that_have_the_papers():
     assert lower.noise_densities == pytest.approx((1e-7,) * 3)
     wide = changed(paper.Settings(), {"filter.start_velocity_std": 1.0}).of(paper.EXTENDED)
     assert wide.settings.start_velocity_std == 1.0
+    whole = changed(paper.Settings(), {"filter.start_variances": [1e-6] * 3 + [1e6] * 3})
+    assert whole.of(paper.EXTENDED).settings.start_variances[3:] == (1e6,) * 3
     with error(ConfigError, "change_times 20 14 7"):
         changed(paper.Settings(), {"change_times": [14, 7]})
     assert settings.of(paper.PAPERS_CASE).settings.jump_rate == 0.01

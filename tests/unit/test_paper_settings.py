@@ -11,10 +11,12 @@ LEAST_SQUARES = (
     "memory=30", "forgetting=0.999", "window=0", "kept_information=0", "threshold=0.5",
     "weight_information=false", "start_mass=900 start_information=3", "rolling_coefficient=0.0005",
     "threshold_force=50", "settle_windows=0 threshold=0.5", "every_row=true",
-    "offset_std=0", "count_grade_twice=true", "first_information=3", "offset_memory=20",
+    "offset_std=0", "noisy_motion=false", "count_grade_twice=true", "first_information=3",
+    "offset_memory=20",
 )  # fmt: skip
 KALMAN = (
-    "start_mass=900", "start_std=0.1", "speed_noise=0.03", "grade_noise=0.02", "accel_walk=0.3",
+    "start_mass=900", "start_std=0.1", "start_speed_std=0.001",
+    "start_grade_std=0.001", "speed_noise=0.03", "grade_noise=0.02", "accel_walk=0.3",
     "grade_walk=0.02", "mass_walk=0.005", "grade_offset=0", "offset_walk=0", "gate=0.1",
     "jacobian_window=0", "jacobian_window=6",
 )  # fmt: skip
@@ -24,7 +26,8 @@ BLENDS = (
     "blend=covariance blend_correlation=0.2", "blend_memory=40", "blend_caution=1",
 )  # fmt: skip
 TORQUE = (
-    "initial_mass=900", "initial_std=0.1", "sample_time=7", "speed_noise=0.5", "accel_noise=0.3",
+    "initial_mass=900", "initial_std=0.1", "initial_slope_std=0.1",
+    "initial_rolling_std=0.01", "sample_time=7", "speed_noise=0.5", "accel_noise=0.3",
     "slope_std=0.02", "slope_length=inf slope_walk=0.001", "rolling_std=0", "rolling_time=60",
     "mass_walk=0.01", "measured_grade=false", "measured_jacobian=false", "constant_errors=false",
     "gate=1",
@@ -95,7 +98,13 @@ def by_speed(short_drive):
 
 @pytest.mark.parametrize(
     "words",
-    ["initial_mass=1500", "initial_slope=0.05", "process_var=[0.1,1e-10,0.005]", "speed_var=1e-2"],
+    [
+        "initial_mass=1500",
+        "initial_slope=0.05",
+        "process_var=[0.1,1e-10,0.005]",
+        "initial_var=0.1,1e-6,0.005",
+        "speed_var=1e-2",
+    ],
 )
 def test_settings_of_speed_alone(by_speed, words):
     estimator, before = ESTIMATORS["speed-ekf"], by_speed.result

@@ -22,6 +22,7 @@ from weighbridge.estimators import (
 from weighbridge.estimators.settings import changed
 from weighbridge.estimators.track import MassTrack, Segment, Status
 from weighbridge.registry import Registry
+from weighbridge.signals import Drive
 from weighbridge.vehicle.fits import JOINT, RLS, SPEED_EKF, SPEED_TORQUE_EKF
 from weighbridge.vehicle.model import Vehicle
 
@@ -48,6 +49,8 @@ class Estimator:
     slow_errors : it estimates wind, resistance and their like beside the mass, which its residual
         still holds
     compared : a comparison of the methods has it; else it weighs where it is named alone
+    own_balance : makes the balance that its settings ask for, of a drive, a vehicle and them; None
+        where they take the usual one
     """
 
     name: str
@@ -60,6 +63,7 @@ class Estimator:
     reckons_fuel: bool = False
     slow_errors: bool = False
     compared: bool = True
+    own_balance: Callable[[Drive, Vehicle, Any], ForceBalance | None] | None = None
 
     def settings_of(self, given: Mapping[str, object]) -> Any:
         """Return settings with some values changed, see `weighbridge.estimators.settings.changed`.
@@ -95,7 +99,13 @@ ESTIMATORS: Final = Registry(
             reckons_fuel=True,
             slow_errors=True,
         ),
-        Estimator(name="rls", estimate=rls.estimate, settings=rls.RlsSettings, fits=_ANY_TORQUE),
+        Estimator(
+            name="rls",
+            estimate=rls.estimate,
+            settings=rls.RlsSettings,
+            fits=_ANY_TORQUE,
+            own_balance=rls.printed_balance,
+        ),
         Estimator(
             name="robust-rls",
             estimate=robust_rls.estimate,

@@ -36,6 +36,8 @@ class EkfFilter:
     start : the least squares whose first estimate starts the filter
     start_mass : that it starts from, in place of theirs [kg]
     start_std : of the mass it starts from, relative [-]
+    start_speed_std, start_grade_std : of speed [m/s] and grade [rad] there; with ``start_std`` and
+        ``grade_offset`` the paper's P0
     speed_noise : error of the speed that stays for a second [m/s]
     grade_noise : error of the grade that stays for a second [rad]
     accel_walk : what unknown forces and torque errors do to the speed in one
@@ -57,6 +59,8 @@ class EkfFilter:
     start: robust_rls.RobustRlsFilter = field(default_factory=robust_rls.RobustRlsFilter)
     start_mass: float | None = None
     start_std: float = 0.3
+    start_speed_std: float = 100.0
+    start_grade_std: float = 0.063
     speed_noise: float = 0.01
     grade_noise: float = 0.004
     accel_walk: float = 0.1
@@ -69,7 +73,10 @@ class EkfFilter:
     jacobian_window: float = 2.0
 
     def __post_init__(self) -> None:
-        for name in ("start_std", "speed_noise", "grade_noise", "accel_walk"):
+        for name in (
+            "start_std", "start_speed_std", "start_grade_std", "speed_noise", "grade_noise",
+            "accel_walk",
+        ):  # fmt: skip
             positive(name, getattr(self, name))
         if not self.gate > 0.0:
             raise ConfigError(f"gate must be positive, got {self.gate}")
@@ -146,6 +153,8 @@ def parameters(settings: EkfFilter, vehicle: Vehicle, period: float) -> kernel.M
         grade_walk=settings.grade_walk**2,
         mass_walk=(settings.mass_walk * mass) ** 2,
         load_walk=(settings.load_walk * mass) ** 2,
+        start_speed_var=settings.start_speed_std**2,
+        start_grade_var=settings.start_grade_std**2,
         offset_var=settings.grade_offset**2,
         offset_walk=settings.offset_walk**2,
         gate=settings.gate,
@@ -220,7 +229,7 @@ def estimate(
         valid,
         rls_params,
     )
-    fit = robust_rls.window_fit(table.time, mean_phi, mean_y, rls_params)
+    fit = robust_rls.window_fit(balance, mean_phi, mean_y, rls_params, settings.start)
     params = parameters(settings, vehicle, robust_rls.row_period(table.time))
     rows = columns(balance, vehicle, valid, settings)
     informed = np.flatnonzero(information * rls_params.window >= settings.start.first_information)

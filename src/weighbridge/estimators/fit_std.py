@@ -45,6 +45,7 @@ class Fitted:
     blocks : how many
     index : (m,) rows of the force table, rising
     influence : (m,) what a newton at each row adds to the mass [kg/N]
+    noise_std : of the part that was added for noise of the motion, relative [-]
     """
 
     mass: float
@@ -52,6 +53,7 @@ class Fitted:
     blocks: int
     index: Ints
     influence: Floats
+    noise_std: float = 0.0
 
 
 def slow_std(
@@ -175,6 +177,7 @@ def judged(
     passing, lasting = slow_std(balance, vehicle, fitted.index, fitted.influence, fitted.mass)
     inertial = balance.motion.source == "inertial"
     noisy = row_noise_std(balance.table, phi, used, noise_share) if inertial else 0.0
+    noisy = float(np.hypot(noisy, fitted.noise_std))
     passing = float(np.hypot(passing, fitted.mass * noisy))
     systematic = float(np.hypot(fitted.mass * slow, lasting))
     std, freedom = honest_std(fitted.scatter, fitted.blocks, passing, systematic)

@@ -115,7 +115,8 @@ def estimate(
     """Weigh by both filters and blend their masses.
 
     The final answer blends the final answers of both, by the mean share over
-    the rows, each counted with what it says of the mass.
+    the rows, each counted with what it says of the mass. With ``innovations`` it
+    is their mean: both have seen every row, and their errors are alike.
 
     Parameters
     ----------
@@ -124,7 +125,8 @@ def estimate(
 
     References
     ----------
-    Du et al. 2025, eq. 34.
+    Du et al. 2025, eq. 34. Equal weights of alike estimates: Bates and Granger, Operational
+    Research Quarterly 20, 1969.
     """
     settings = settings or HybridSettings()
     balance, vehicle = robust_rls.as_set(balance, vehicle, settings.ekf.start)
@@ -135,7 +137,7 @@ def estimate(
     begin = robust_rls.initial_state(settings.ekf.start, params.rls.window)
     start = kernel.initial_state(begin, params)  # type: ignore[no-untyped-call]
     _, mass, var, share, _, _, mean_phi, mean_y, _, _ = kernel.run(start, rows, phi, y, params)
-    fit = robust_rls.window_fit(table.time, mean_phi, mean_y, params.rls)
+    fit = robust_rls.window_fit(balance, mean_phi, mean_y, params.rls, settings.ekf.start)
     row_reason = robust_rls.window_reason(table, valid, mean_phi)
     counted = np.where(row_reason == 0, np.nan_to_num(phi) ** 2, 0.0)
 
@@ -144,6 +146,8 @@ def estimate(
         if not weight.sum() > 0.0:
             return float("nan")
         mean_share = float(np.average(share[chosen], weights=weight))
+        if Blend(settings.blend) is Blend.INNOVATIONS:
+            mean_share = 0.5
         time = table.time[chosen]
         fitted = fit.mass(float(time[0]), float(time[-1]))[0]
         filtered = ekf.constant_mass(rows, chosen, fit.mass()[0], params.ekf)

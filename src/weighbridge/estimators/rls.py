@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from weighbridge.balance import ForceBalance, Reason
+from weighbridge.balance import ForceBalance, Reason, force_balance
 from weighbridge.balance.table import ForceTable
 from weighbridge.errors import ConfigError
 from weighbridge.estimators.fit_std import Fitted, judged
@@ -19,8 +19,8 @@ from weighbridge.estimators.judging import consider_std, converged_at, segments
 from weighbridge.estimators.regression import regression
 from weighbridge.estimators.track import MassTrack
 from weighbridge.kernels import rls as kernel
-from weighbridge.navigation.printed import PrintedFilterSettings
-from weighbridge.signals import Bools, Floats, Ints
+from weighbridge.navigation.printed import PrintedFilterSettings, mounting_of, printed_motion
+from weighbridge.signals import Bools, Drive, Floats, Ints
 from weighbridge.signals.robust import spread
 from weighbridge.vehicle.model import Vehicle
 
@@ -175,6 +175,18 @@ def estimate(
         reason=found.reason,
         segments=segments(balance, vehicle, phi, used, part, settings),
     )
+
+
+def printed_balance(drive: Drive, vehicle: Vehicle, settings: RlsSettings) -> ForceBalance | None:
+    """Balance a drive by the paper's own filter of the motion, no lateness of the torque.
+
+    None where the settings do not ask for what is printed.
+    """
+    if not settings.printed:
+        return None
+    mounting = mounting_of(drive, vehicle.mounting, settings.filter)
+    motion = printed_motion(drive, mounting, settings.filter)
+    return force_balance(drive, vehicle, motion, delay=0.0, lag=0.0)
 
 
 def run_in_turn(

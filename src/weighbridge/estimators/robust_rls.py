@@ -17,6 +17,7 @@ from weighbridge.constants import GRAVITY
 from weighbridge.errors import ConfigError
 from weighbridge.estimators.fit_std import Fitted, judged
 from weighbridge.estimators.gate import GateSettings
+from weighbridge.estimators.joint.slow_errors import motion_variance
 from weighbridge.estimators.judging import (
     UNMODELLED_STD,
     consider_std,
@@ -24,6 +25,7 @@ from weighbridge.estimators.judging import (
     nothing,
     segments,
 )
+from weighbridge.estimators.noisy_motion import USUAL_STD
 from weighbridge.estimators.regression import regression
 from weighbridge.estimators.track import MassTrack
 from weighbridge.kernels import robust_rls as kernel
@@ -32,7 +34,7 @@ from weighbridge.signals.robust import huber, spread
 from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.possible import not_negative, positive, within
 
-NOISE_SHARE: Final = 1.5
+NOISE_SHARE: Final = 0.75
 """What noise of the motion costs, see `weighbridge.estimators.noisy_motion.row_noise_std` [-]."""
 
 DEPENDENCE: Final = 5.0
@@ -83,6 +85,8 @@ class RobustRlsFilter:
         single parameter
     offset_memory : time of driving in which what was learnt of the offset falls to
         1/e [s]: engine and tyres warm, the accelerometer drifts
+    noisy_motion : the final mass allows for noise of the motion, which draws it down; not so in
+        the paper
     count_grade_twice : add the grade to the regressor although the specific
         force has it already, as eq. 14 of the paper is printed; to compare only
     """
@@ -103,6 +107,7 @@ class RobustRlsFilter:
     sensor_ahead: float | None = None
     offset_std: float = 0.03
     offset_memory: float = 100.0
+    noisy_motion: bool = True
     count_grade_twice: bool = False
 
     def __post_init__(self) -> None:
@@ -238,6 +243,12 @@ class WindowFit:
     time, phi, y : (m,) of the windows
     params : of the kernel
     block : length of the blocks of dependent rows [s]
+    motion_var : variance of the noise in ``phi``, which would draw the mass down [m^2/s^4]
+
+    References
+    ----------
+    Attenuation bias, corrected by the known variance of the regressor's error: Fuller,
+    Measurement Error Models, 1987, ch. 1.2.
     """
 
     time: Floats
@@ -245,6 +256,7 @@ class WindowFit:
     y: Floats
     params: kernel.RobustRlsParams
     block: float
+    motion_var: float
 
     def mass(self, begin: float = -np.inf, end: float = np.inf) -> tuple[float, float, int]:
         """Mass of a span of time, its standard deviation [kg] and the blocks behind it.
@@ -266,13 +278,15 @@ class WindowFit:
         mass, noise, weight, ridge = self._huber(phi, y)
         block = self.block if np.isinf(begin) else BLOCKS[0]
         number = ((self.time[chosen] - self.time[chosen][0]) // block).astype(np.int64)
-        parts = _sums(phi, y, weight, number)
+        parts = self._sums(phi, y, weight, number)
         parts = parts[:, parts[2] > 0.0]
         n = parts.shape[1]
         if n < 3:
             return mass, float("inf"), n
-        power, first, count = _sums(phi, y, weight)[:3]
+        power, first, count = self._sums(phi, y, weight)[:3]
         known = power - first**2 / (count + ridge)
+        if not known > 0.0:
+            return mass, float("inf"), n
         least = noise * float(np.sqrt(self.params.dependence / known))
         without = _solve(parts.sum(axis=1, keepdims=True) - parts, ridge)[0]
         std = float(np.sqrt((n - 1) / n * np.sum((without - without.mean()) ** 2)))
@@ -289,7 +303,7 @@ class WindowFit:
             weight = huber(residual, noise, self.params.threshold)
             if self.params.offset_std > 0.0:
                 ridge = self.params.dependence * (noise / (self.params.offset_std * mass)) ** 2
-            mass, offset = (float(x[0]) for x in _solve(_sums(phi, y, weight)[:, None], ridge))
+            mass, offset = (float(x[0]) for x in _solve(self._sums(phi, y, weight)[:, None], ridge))
             if abs(mass - before) <= 1e-7 * abs(mass):
                 break
         return mass, noise, weight, ridge
@@ -298,25 +312,33 @@ class WindowFit:
     def influence(self) -> Floats:
         """What a newton in each window adds to the mass (m,) [kg/N], its weight as it is."""
         _, _, weight, ridge = self._huber(self.phi, self.y)
-        power, first, count, _, _ = _sums(self.phi, self.y, weight)
+        power, first, count, _, _ = self._sums(self.phi, self.y, weight)
         if np.isinf(ridge):
             return np.asarray(weight * self.phi / power)
         determinant = power * (count + ridge) - first**2
         return np.asarray(weight * ((count + ridge) * self.phi - first) / determinant)
 
     @property
+    def attenuation(self) -> float:
+        """What noise of the motion would take from the mass, and the fit does not let it [-]."""
+        _, _, weight, ridge = self._huber(self.phi, self.y)
+        power, first, count, _, _ = self._sums(self.phi, self.y, weight)
+        known = power - first**2 / (count + ridge)
+        return float(self.motion_var * count / known) if known > 0.0 else float("inf")
+
+    def _sums(self, phi: Floats, y: Floats, weight: Floats, block: Ints | None = None) -> Floats:
+        """Weighted sums of phi^2 without its noise, phi, 1, phi y and y: (5,), or (5, blocks)."""
+        power = phi * phi - self.motion_var
+        rows = np.stack([power, phi, np.ones_like(phi), phi * y, y]) * weight
+        if block is None:
+            return np.asarray(rows.sum(axis=1))
+        return np.stack([np.bincount(block, row) for row in rows])
+
+    @property
     def bound(self) -> float:
         """Cramér-Rao bound if the windows were independent and the model true [kg]."""
         noise = spread(self.y - self.phi * self.mass()[0])
         return noise / float(np.sqrt(np.sum(self.phi**2)))
-
-
-def _sums(phi: Floats, y: Floats, weight: Floats, block: Ints | None = None) -> Floats:
-    """Weighted sums of phi^2, phi, 1, phi y and y: (5,), or (5, blocks)."""
-    rows = np.stack([phi * phi, phi, np.ones_like(phi), phi * y, y]) * weight
-    if block is None:
-        return np.asarray(rows.sum(axis=1))
-    return np.stack([np.bincount(block, row) for row in rows])
 
 
 def _solve(sums: Floats, ridge: float) -> tuple[Floats, Floats]:
@@ -330,13 +352,19 @@ def _solve(sums: Floats, ridge: float) -> tuple[Floats, Floats]:
 
 
 def window_fit(
-    time: Floats, mean_phi: Floats, mean_y: Floats, params: kernel.RobustRlsParams
+    balance: ForceBalance,
+    mean_phi: Floats,
+    mean_y: Floats,
+    params: kernel.RobustRlsParams,
+    settings: RobustRlsFilter,
 ) -> WindowFit:
     """Collect the windows that the kernel has folded in."""
+    time = balance.table.time
     folded = np.isfinite(mean_phi)
     span = float(time[-1] - time[0]) if time.size else 0.0
     block = float(np.clip(0.1 * span, *BLOCKS))
-    return WindowFit(time[folded], mean_phi[folded], mean_y[folded], params, block)
+    noise = motion_variance(balance.motion, params.window) if settings.noisy_motion else 0.0
+    return WindowFit(time[folded], mean_phi[folded], mean_y[folded], params, block, noise)
 
 
 def estimate(
@@ -372,7 +400,7 @@ def estimate(
         "robust-rls",
         balance,
         vehicle,
-        window_fit(table.time, mean_phi, mean_y, params),
+        window_fit(balance, mean_phi, mean_y, params, settings),
         window_reason(table, valid, mean_phi),
         noise_share=NOISE_SHARE,
         gate=settings,
@@ -421,9 +449,14 @@ def finish(
     mass = fitted if final is None else final(slice(0, table.time.size))
     slow = consider_std(balance, phi, used, vehicle)
     index = np.maximum(np.searchsorted(table.time, fit.time, side="right") - 1, 0)
-    # What holds an offset of the force knows it; a filter without one takes it for mass.
-    influence = fit.influence if final is None else fit.phi / np.sum(fit.phi**2)
-    weighed = Fitted(mass=mass, scatter=scatter, blocks=blocks, index=index, influence=influence)
+    weighed = Fitted(
+        mass=mass,
+        scatter=scatter,
+        blocks=blocks,
+        index=index,
+        influence=fit.influence,
+        noise_std=USUAL_STD * fit.attenuation if final is None else 0.0,
+    )
     found = judged(balance, vehicle, used, phi, weighed, slow, noise_share, gate)
     # A running mass that forgets is that of a stretch of time.
     passing = np.hypot(slow, UNMODELLED_STD)

@@ -47,7 +47,8 @@ class SpeedEkfSettings:
     ----------
     initial_mass : the mass of the vehicle's calibration when None [kg]
     initial_slope : sin(theta + beta) at the start [-]
-    process_var : diagonal of Q for speed, inverse mass and slope; P starts there
+    process_var : diagonal of Q for speed, inverse mass and slope
+    initial_var : diagonal of P0 for the same; that of Q where empty, as in the paper
     speed_var : R [m^2/s^2]
     tail : part of the samples, the last, whose masses are averaged [-]
     groups : equal groups that these are cut into
@@ -56,6 +57,7 @@ class SpeedEkfSettings:
     initial_mass: float | None = None
     initial_slope: float = 0.01
     process_var: tuple[float, float, float] = (0.1, 1e-12, 0.005)
+    initial_var: tuple[float, ...] = ()
     speed_var: float = 1e-4
     tail: float = TAIL
     groups: int = GROUPS
@@ -68,6 +70,8 @@ class SpeedEkfSettings:
                 "process_var must not be negative and speed_var must be positive, "
                 f"got {self.process_var} and {self.speed_var}"
             )
+        if len(self.initial_var) not in (0, 3) or min(self.initial_var, default=1.0) <= 0.0:
+            raise ConfigError(f"initial_var takes three numbers above 0, got {self.initial_var}")
         if not 0.0 < self.tail <= 1.0:
             raise ConfigError(f"tail must be in (0, 1], got {self.tail}")
         if not self.groups >= 1:
@@ -122,6 +126,8 @@ def run_filter(
     mass = model.mass if settings.initial_mass is None else settings.initial_mass
     params = kernel_parameters(model, settings.process_var, settings.speed_var)
     state = kernel.initial_state(mass, settings.initial_slope, params)  # type: ignore[no-untyped-call]
+    if settings.initial_var:
+        state = state._replace(cov=np.diag(settings.initial_var))
     if flat:
         constant = params.process_var * np.array([1.0, 0.0, 1.0])
         params = params._replace(process_var=constant)

@@ -102,6 +102,9 @@ class SpeedTorqueSettings(GateSettings):
     ----------
     initial_mass : tare, else usual mass of the class when None [kg]
     initial_std : its standard deviation, relative [-]
+    initial_slope_std, initial_rolling_std : of these states at the start [-], with ``initial_std``
+        the paper's P0; the sizes of both errors when None. The speed starts at its first sample,
+        with its noise
     sample_time : between samples of the speed [s]; the paper's is 7 s
     speed_noise : of one sample of the speed [m/s]; the paper's R is its square
     accel_noise : white noise of the acceleration, in one second [m/s^2]
@@ -121,6 +124,8 @@ class SpeedTorqueSettings(GateSettings):
 
     initial_mass: float | None = None
     initial_std: float = 0.3
+    initial_slope_std: float | None = None
+    initial_rolling_std: float | None = None
     sample_time: float = 1.0
     speed_noise: float | None = None
     accel_noise: float | None = None
@@ -144,7 +149,10 @@ class SpeedTorqueSettings(GateSettings):
             value = getattr(self, name)
             if value is not None and not (math.isfinite(value) and value > 0.0):
                 raise ConfigError(f"{name} must be a positive number, got {value}")
-        for name in ("accel_noise", "slope_std", "slope_walk", "rolling_std", "mass_walk"):
+        for name in (
+            "initial_slope_std", "initial_rolling_std", "accel_noise", "slope_std", "slope_walk",
+            "rolling_std", "mass_walk",
+        ):  # fmt: skip
             value = getattr(self, name)
             if value is not None and not (math.isfinite(value) and value >= 0.0):
                 raise ConfigError(f"{name} must be zero or positive, got {value}")
@@ -327,10 +335,13 @@ def initial_state(
 ) -> kernel.SpeedTorqueState:
     """Start at a mass [kg], with slope and errors of the force unknown but for their sizes."""
     constant = constant_std(balance, vehicle) if settings.constant_errors else np.zeros(0)
-    lasting = [(settings.initial_std / mass) ** 2, params.slope_var, params.rolling_var]
+    own = (settings.initial_slope_std, settings.initial_rolling_std)
+    usual = (params.slope_var, params.rolling_var)
+    slope, rolling = (var if std is None else std**2 for std, var in zip(own, usual, strict=True))
     x = np.zeros(kernel.CONSTANT + constant.size)
     x[kernel.INVERSE] = 1.0 / mass
-    cov = np.diag(np.concatenate(([params.speed_var], lasting, constant**2)))
+    inverse = (settings.initial_std / mass) ** 2
+    cov = np.diag(np.concatenate(([params.speed_var, inverse, slope, rolling], constant**2)))
     return kernel.SpeedTorqueState(x, cov, False)
 
 

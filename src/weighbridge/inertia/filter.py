@@ -415,9 +415,12 @@ def _run_fixed(
     if settings.offset_std > 0.0:
         # These filters know no offset: the travel counts from its mean.
         travel = travel - np.mean(travel, axis=0)
-    start = np.diag(np.repeat((settings.start_velocity_std**2, settings.start_std**2), 3))
+    start = np.repeat((settings.start_velocity_std**2, settings.start_std**2), 3)
+    if settings.start_variances:
+        start = np.array(settings.start_variances)
+        start[3:] /= reference(ride) ** 2
     begin = kalman_bucy.initial_state(  # type: ignore[no-untyped-call]
-        np.repeat((0.0, 1.0), 3), start
+        np.repeat((0.0, 1.0), 3), np.diag(start)
     )
     _, mean, std = kalman_bucy.run(
         begin,

@@ -25,6 +25,9 @@ class InertiaSettings:
     start_std : standard deviation of the inverse parameter at the start, relative [-]
     start_velocity_std : of the velocities at the start [m/s], [rad/s]; for the filters without
         jumps
+    start_variances : diagonal of P0 in full, in place of both: of vertical velocity [m^2/s^2], roll
+        and pitch rate [rad^2/s^2], mass [kg^2], roll and pitch inertia [kg^2 m^4]; none or six, for
+        the filters without jumps
     jump_rate : jumps expected per time [1/s]
     jump_std : standard deviation of the inverse parameter after a jump, relative [-]
     spawn : time between two hypotheses of a jump [s]
@@ -50,6 +53,7 @@ class InertiaSettings:
     range: tuple[float, float] = (0.125, 8.0)
     start_std: float = 1.0
     start_velocity_std: float = 10.0
+    start_variances: tuple[float, ...] = ()
     jump_rate: float = 1e-4
     jump_std: float = 1.0
     spawn: float = 2e-3
@@ -78,7 +82,9 @@ class InertiaSettings:
         for name in ("start_std", "start_velocity_std", "jump_rate", "jump_std", "spawn"):
             if not getattr(self, name) > 0.0:
                 raise ConfigError(f"{name} must be positive, got {getattr(self, name)}")
-        for name, count in (("process_densities", 6), ("noise_densities", 3)):
+        for name, count in (
+            ("start_variances", 6), ("process_densities", 6), ("noise_densities", 3),
+        ):  # fmt: skip
             densities = getattr(self, name)
             if len(densities) not in (0, count) or any(not d > 0.0 for d in densities):
                 raise ConfigError(f"{name} must be {count} positive numbers, got {densities}")

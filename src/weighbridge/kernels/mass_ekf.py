@@ -20,6 +20,7 @@ class MassEkfParams(NamedTuple):
     accel_walk : of the acceleration that the model does not know [m^2/s^3]
     grade_walk : of the road's slope [rad^2/s]
     mass_walk, load_walk : of the mass while driving and while standing [kg^2/s]
+    start_speed_var, start_grade_var : of speed and grade at the start [(m/s)^2], [rad^2]
     offset_var, offset_walk : of the offset of the measured grade at the start [rad^2]
         and its walk [rad^2/s]
     gate : speed innovations beyond this many standard deviations are left out [-]
@@ -36,6 +37,8 @@ class MassEkfParams(NamedTuple):
     grade_walk: float
     mass_walk: float
     load_walk: float
+    start_speed_var: float
+    start_grade_var: float
     offset_var: float
     offset_walk: float
     gate: float
@@ -89,8 +92,7 @@ class MassEkfState(NamedTuple):
 
 
 UNKNOWN_SPEED_VAR = 1e4
-UNKNOWN_GRADE_VAR = 4e-3
-"""Variances before anything is measured [(m/s)^2], [rad^2]; a road is within 8 % or so."""
+"""Variance of a speed that nothing has measured [(m/s)^2]."""
 
 SPEED, GRADE, MASS, OFFSET = range(4)
 """Places in the state."""
@@ -104,8 +106,8 @@ def initial_state(mass, mass_var, row, params):
     """Start at a row, with a mass [kg] and its variance [kg^2]; the rest is unknown."""
     x = np.array([0.0, 0.0, mass, 0.0])
     cov = np.zeros((4, 4))
-    cov[SPEED, SPEED] = UNKNOWN_SPEED_VAR
-    cov[GRADE, GRADE] = UNKNOWN_GRADE_VAR
+    cov[SPEED, SPEED] = params.start_speed_var
+    cov[GRADE, GRADE] = params.start_grade_var
     cov[MASS, MASS] = mass_var
     cov[OFFSET, OFFSET] = params.offset_var
     return MassEkfState(x, cov, row)

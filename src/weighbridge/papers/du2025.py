@@ -167,7 +167,10 @@ def _run_as_printed(
         if form in FORMS:
             done.printed_tracks[code] = found
         whole = form.of(settings.printed)
-        unit = replace(whole, ekf=replace(whole.ekf, start_std=1.0 / mass))
+        unit = replace(
+            whole,
+            ekf=replace(whole.ekf, start_std=1.0 / mass, start_speed_std=1.0, start_grade_std=1.0),
+        )
         done.unit_start[code] = rms(late_error(run(unit)["ekf"]))
     tenfold = FORMS[1].of(settings.printed)
     start_ = replace(tenfold.ekf.start, threshold=min(0.5, tenfold.ekf.start.threshold))
@@ -229,7 +232,8 @@ def reproduce(
     as_paper: list[DriveResult] = []
     road: list[DriveResult] = []
     sheet: list[DriveResult] = []
-    for load, payload in LOADS.items():
+    payloads = (settings or Settings()).payloads
+    for load, payload in zip(LOADS, payloads, strict=True):
         for k in range(drives):
             made = simulate(payload, seed + k, as_paper=True)
             if not as_paper:
@@ -293,9 +297,6 @@ def figures(done: Reproduction) -> dict[str, Found]:
     for load, theirs in PAPER_RMSE.items():
         for m, paper, time_ in zip(METHODS, theirs, PAPER_TIME[load], strict=True):
             found[f"{m} {load}"] = read(partial(_cell, done, load=load, method=m, paper=paper))
-            for name, drives in (("ours", done.drives), ("road", done.road)):
-                rmse = float(cell(drives, load, m, "late_rmse").mean())
-                found[f"{m} {load} {name}"] = Found(f"{rmse:.0f} kg", rmse <= paper)
             seconds = float(cell(done.drives, load, m, "seconds").mean())
             found[f"time {m} {load}"] = Found(f"{seconds:.3f} s", seconds <= time_)
     for number, load in zip((5, 6, 7), LOADS, strict=True):
@@ -303,7 +304,18 @@ def figures(done: Reproduction) -> dict[str, Found]:
     for claim in CLAIMS:
         found[claim.code] = read(partial(claim.judge, done))
     found["work"] = Found(*work(done.drives))
+    found |= our_rmse(done.drives, "ours") | our_rmse(done.road, "road")
     return found | _blended(done) | _given()
+
+
+def our_rmse(drives: Sequence[DriveResult], name: str) -> dict[str, Found]:
+    """RMSE of our methods beside Table 2, for the loads of some drives."""
+    found = {}
+    for load in dict.fromkeys(d.load for d in drives):
+        for m, paper in zip(METHODS, PAPER_RMSE[load], strict=True):
+            rmse = float(cell(tuple(drives), load, m, "late_rmse").mean())
+            found[f"{m} {load} {name}"] = Found(f"{rmse:.0f} kg", rmse <= paper)
+    return found
 
 
 def read(judge: Callable[[str], tuple[str, bool]]) -> Found:

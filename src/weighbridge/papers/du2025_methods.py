@@ -44,6 +44,7 @@ PRINTED: Final = hybrid.HybridSettings(
             forgetting=0.999,
             kept_information=0.0,
             offset_std=0.0,
+            noisy_motion=False,
             weight_information=False,
             every_row=True,
             rolling_coefficient=0.0005,
@@ -153,6 +154,7 @@ class Settings:
         where ``printed.ekf.start.every_row`` is false
     count_grade_twice : in the regressor, as eq. 14 is printed
     rolling_coefficient : that the filters are told in place of the vehicle's [-]
+    payloads : of the judged drives, without, at half and at full load [kg]
     blend : of the hybrid, short for ``ours.blend``; not when ``as_printed``
     """
 
@@ -161,6 +163,7 @@ class Settings:
     as_printed: bool = False
     count_grade_twice: bool = False
     rolling_coefficient: float | None = None
+    payloads: tuple[float, float, float] = (0.0, 3000.0, 6000.0)
     blend: hybrid.Blend = hybrid.HybridSettings().blend
 
     @property

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
@@ -26,15 +27,18 @@ CONVERGED: Final = 300.0
 
 
 def item_figures(done: Reproduction) -> dict[str, Found]:
-    """Figures that the paper's items ask for: of the three tests."""
-    found = equations()
-    for name, runs in (
-        ("", [t.ours for t in done.tests]),
-        ("printed ", [t.printed for t in done.tests]),
-    ):
-        tests = list(zip(done.tests, runs, strict=True))
-        errors = [t.error(r) for t, r in tests]
-        bands = [t.band(r) for t, r in tests]
+    """Figures that the paper's items ask for."""
+    found = equations() | of_tests(done.tests)
+    return found | torque_figures(done.torque) | {"fig 4": _mean_mass()}
+
+
+def of_tests(tests: Sequence[Test]) -> dict[str, Found]:
+    """Figures of the three tests: figs. 7 to 15 and both tables."""
+    found = {}
+    for name, runs in (("", [t.ours for t in tests]), ("printed ", [t.printed for t in tests])):
+        each = list(zip(tests, runs, strict=True))
+        errors = [t.error(r) for t, r in each]
+        bands = [t.band(r) for t, r in each]
         said = " / ".join(f"{100.0 * e:+.4f}" for e in errors)
         found[f"{name}errors"] = Found(
             f"errors {said} %", max(abs(e) for e in errors) <= PAPER_WORST
@@ -43,7 +47,7 @@ def item_figures(done: Reproduction) -> dict[str, Found]:
             f"± {' / '.join(f'{b:.0f}' for b in bands)} kg",
             all(b <= paper for b, paper in zip(bands, PAPER_BANDS, strict=True)),
         )
-    for test in done.tests:
+    for test in tests:
         late, end = _late_errors(test.printed, test)
         n = test.number
         found[f"late {n}"] = Found(f"{late:+.1f} %", abs(late) <= BOUND)
@@ -52,7 +56,7 @@ def item_figures(done: Reproduction) -> dict[str, Found]:
         found[f"speed {n}"] = Found(
             f"off by {off:.2f} m/s RMS; R² of the speed {explained:.2f}", off <= LINE
         )
-    return found | torque_figures(done.torque) | {"fig 4": _mean_mass()}
+    return found
 
 
 def _mean_mass() -> Found:

@@ -23,6 +23,7 @@ class Conditions:
 
     Attributes
     ----------
+    light_load, heavy_load : of drives 5 and 6, 7 and 8 [kg]
     tyre_under, tyre_over : factor on the rolling resistance at 0.5 bar less and more than 2.15
         bar [-]: pressure to the power -0.45, the middle of the exponents SAE J2452 fits to
         passenger-car tyres
@@ -35,6 +36,8 @@ class Conditions:
         slip, no lean of the body, no lateness
     """
 
+    light_load: float = 125.0
+    heavy_load: float = 240.0
     tyre_under: float = 1.13
     tyre_over: float = 0.91
     one_window: float = 0.044
@@ -46,7 +49,10 @@ class Conditions:
     ideal: bool = False
 
     def __post_init__(self) -> None:
-        for name in ("wind", "high_wind", "low_wind", "cold", "one_window", "two_windows"):
+        for name in (
+            "light_load", "heavy_load", "wind", "high_wind", "low_wind", "cold", "one_window",
+            "two_windows",
+        ):  # fmt: skip
             if not getattr(self, name) >= 0.0:
                 raise ConfigError(f"{name} must be zero or positive, got {getattr(self, name):g}")
 
@@ -157,7 +163,8 @@ HIGHWAY_LIMIT: Final = 25.0
 
 def scenario(drive: TestDrive, *, seed: int, conditions: Conditions = CONDITIONS) -> Scenario:
     """Make the scenario of one row of the table."""
-    made = make_scenario("car", payload=drive.payload, seed=seed)
+    loads = {0.0: 0.0, 125.0: conditions.light_load, 240.0: conditions.heavy_load}
+    made = make_scenario("car", payload=loads[drive.payload], seed=seed)
     route = made.route
     highway = route.limit > HIGHWAY_LIMIT
     out = highway & (np.arange(highway.size) < highway.size // 2)

@@ -128,31 +128,27 @@ def _car(done: Reproduction) -> dict[str, Found]:
         off = float(np.max(np.abs(errors)))
         gears = ", ".join(f"{scalar_from_si(g, 'rpm'):.1f}" for g in car.driveline.gearings)
         each[f"gears {way}"] = Found(f"{gears} rpm s/m; {percent(off)} at most", off <= 0.02)
-    true = truth()
-    for way, car in (
-        ("printed", done.printed_car.vehicle),
-        ("control", done.control.vehicle),
-        ("ours", done.car),
-    ):
-        values = fitted(car)
-        close = all(
-            abs(v - t) <= step * 1.001
-            for v, t, step in zip(values[:3], true[:3], STEPS, strict=True)
-        )
-        each[f"road {way}"] = Found(f"{road(values)}; truly {road(true)}", close)
-    each["wheels printed"] = _wheels(done.printed_car.vehicle)
-    each["wheels control"] = _wheels(done.control.vehicle)
-    for way, r_squared in (
-        ("printed", done.printed_car.r_squared),
-        ("control", done.control.r_squared),
-        ("ours", unweighted(done.calibration)),
-    ):
-        each[f"r2 {way}"] = Found(f"{r_squared:.3f}", r_squared >= PAPER_R_SQUARED - 0.005)
+    each |= of_fit("printed", done.printed_car.vehicle, done.printed_car.r_squared)
+    each |= of_fit("control", done.control.vehicle, done.control.r_squared)
+    each |= of_fit("ours", done.car, unweighted(done.calibration))
     if done.loads:
         for way, torques in (("printed", done.printed_loads), ("ours", done.loads)):
             r_squared = joined(torques).r_squared
             each[f"r2 loads {way}"] = Found(f"{r_squared:.3f}", r_squared >= 0.95)
     return each
+
+
+def of_fit(way: str, car: Vehicle, r_squared: float) -> dict[str, Found]:
+    """Table 6 and the torque fit of one training."""
+    values, true = fitted(car), truth()
+    close = all(
+        abs(v - t) <= step * 1.001 for v, t, step in zip(values[:3], true[:3], STEPS, strict=True)
+    )
+    return {
+        f"road {way}": Found(f"{road(values)}; truly {road(true)}", close),
+        f"wheels {way}": _wheels(car),
+        f"r2 {way}": Found(f"{r_squared:.3f}", r_squared >= PAPER_R_SQUARED - 0.005),
+    }
 
 
 def road(values: tuple[float, float, float, float]) -> str:
@@ -223,9 +219,10 @@ def _drives(drives: Sequence[DriveResult]) -> dict[str, Found]:
         if name == "load":
             masses = np.array([(1.0 + d.typical) * d.true_mass for d in day])
             light, heavy = masses[1:3].mean() - masses[0], masses[3:5].mean() - masses[0]
+            less, more = (day[k].true_mass - day[0].true_mass for k in (1, 3))
             each["loads"] = Found(
-                f"{light:+.0f} kg for 125, {heavy:+.0f} kg for 240",
-                abs(light / 125.0 - 1.0) < 0.5 > abs(heavy / 240.0 - 1.0),
+                f"{light:+.0f} kg for {less:.0f}, {heavy:+.0f} kg for {more:.0f}",
+                abs(light / less - 1.0) < 0.5 > abs(heavy / more - 1.0),
             )
         if name in ("load", "window"):
             there, back = passes(day)

@@ -240,7 +240,7 @@ def _figures(results: dict[str, list[RideResult]]) -> dict[str, Found]:
     """Figures that the paper's items ask for: mass / roll / pitch."""
     found = equations()
     for code, case in FOLLOWED.items():
-        found |= {f"{name} {code}": f for name, f in _followed(results[case.name]).items()}
+        found |= {f"{name} {code}": f for name, f in followed(results[case.name]).items()}
     by_noise = [
         100.0 * np.median(_each(results[case.name], "mape"), axis=0)
         for case in (HIGHER_NOISE, PRINTED_NOISE, LOWER_NOISE)
@@ -256,7 +256,7 @@ def _figures(results: dict[str, list[RideResult]]) -> dict[str, Found]:
     return found
 
 
-def _followed(found: list[RideResult]) -> dict[str, Found]:
+def followed(found: list[RideResult]) -> dict[str, Found]:
     """What Table 2 and sec. 5 state of a filter: of the roads the median."""
     near = _each(found, "near")[:, 1:]
     mape, rmse, velocity_rmse, velocity_mape = (

@@ -34,12 +34,10 @@ from weighbridge.estimators.joint.changing import in_place_of_loads, largest
 from weighbridge.estimators.joint.contradicted import contradicted
 from weighbridge.estimators.joint.foreign import of_another
 from weighbridge.estimators.joint.slow_errors import motion_variance, with_variance
-from weighbridge.estimators.rls import RlsSettings
 from weighbridge.estimators.settings import differences
 from weighbridge.estimators.squat import of_vehicle
 from weighbridge.messages import Problem, phrase, refused
 from weighbridge.navigation.motion import Motion
-from weighbridge.navigation.printed import mounting_of, printed_motion
 from weighbridge.navigation.select import identify_motion, without_accelerometer
 from weighbridge.pipeline.given import (
     GivenDrive,
@@ -244,10 +242,9 @@ def _weigh_all(drive: Drive, vehicle: Vehicle, method: str, settings: Any) -> We
     lacking = no_speed(drive) if alone else what_is_missing(drive, vehicle)
     if lacking:
         return without_mass(drive, vehicle, method, lacking, problems)
-    if isinstance(settings, RlsSettings) and settings.printed:
-        mounting = mounting_of(drive, vehicle.mounting, settings.filter)
-        motion = printed_motion(drive, mounting, settings.filter)
-        balance = force_balance(drive, vehicle, motion, delay=0.0, lag=0.0)
+    own = ESTIMATORS[method].own_balance
+    balance = own(drive, vehicle, settings) if own and settings is not None else None
+    if balance is not None:
         problems += vehicle.provenance.problems + unbacked(vehicle)
     elif alone:
         balance = speed_balance(drive, vehicle)
@@ -436,7 +433,7 @@ def _by(weighing: Weighing, method: str, joined: MassTrack | None) -> Weighing:
 def _another_balance(weighing: Weighing, method: str) -> bool:
     """Whether a method needs another balance than that of a weighing."""
     made, other = weighing.estimator, ESTIMATORS[method]
-    if isinstance(weighing.settings, RlsSettings) and weighing.settings.printed:
+    if made.own_balance and weighing.settings is not None:
         return True
     if made.speed_alone or other.speed_alone:
         return True

@@ -225,7 +225,9 @@ def motion_variance(motion: Motion, length: float = WINDOW) -> float:
     level = motion.specific_force_std
     if motion.source in BY_SPEED or not np.isfinite(level):
         level = UNMEASURED_NOISE
-    return MOTION_WINDOW_STD**2 + (MOTION_SHARE * level) ** 2 * WINDOW / length
+    # Over any length it is not above that of one sample.
+    share = min(MOTION_SHARE**2 * WINDOW / length, 1.0)
+    return MOTION_WINDOW_STD**2 + share * level**2
 
 
 def with_variance(motion: Motion, variance: float) -> Motion:
