@@ -128,7 +128,7 @@ def test_an_accelerometer_is_not_read(weighed):
 
 
 def test_a_cruise_on_the_flat_carries_no_mass():
-    calm = wb.weigh(drive(3, wave=0.06, hills=0.0), CAR, METHOD)
+    calm = wb.weigh(drive(3, wave=0.03, hills=0.0), CAR, METHOD)
     assert calm.status == "not_excited"
     assert np.isnan(calm.mass)
 

@@ -26,7 +26,7 @@ from weighbridge.balance.hybrid import motor_helps
 from weighbridge.balance.shaking import shaken
 from weighbridge.balance.speed_balance import speed_balance
 from weighbridge.balance.torque_drift import smoothed_steps
-from weighbridge.errors import ConfigError, WeighbridgeError
+from weighbridge.errors import ConfigError, DriveError, WeighbridgeError
 from weighbridge.estimators import ESTIMATORS, MassTrack, Status, joint
 from weighbridge.estimators.gate import GATE
 from weighbridge.estimators.joint.bend import bent
@@ -205,13 +205,18 @@ def weigh_checked(drive: Drive, vehicle: Vehicle, method: str, settings: Any = N
     less = without_accelerometer(drive)
     if len(less.signals) == len(drive.signals) or not _by_noise(found):
         return found
-    left = _weigh_all(less, vehicle, method, settings)
+    try:
+        left = _weigh_all(less, vehicle, method, settings)
+    except DriveError:
+        return found
     if left.status is not Status.CONVERGED:
         return found
     if found.status is Status.CONVERGED and left.std > LEFT_OUT * found.std:
         return found
     why = found.reason or phrase("wider", mass=found.mass, half=1.96 * found.std)
-    return replace(left, problems=(Problem.of("imu.left_out", why=why), *left.problems))
+    of_sensor = (p for p in found.problems if p.id.startswith("imu.") and p not in left.problems)
+    problems = (Problem.of("imu.left_out", why=why), *of_sensor, *left.problems)
+    return replace(left, problems=problems)
 
 
 NOISY: Final = ("motion.wide", "imu.noise")
