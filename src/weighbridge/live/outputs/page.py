@@ -11,6 +11,7 @@ from collections.abc import AsyncIterator, Collection
 from importlib.resources import files
 from ipaddress import ip_address
 from itertools import islice
+from socket import AF_INET, AF_INET6, create_server
 from threading import Lock, Thread
 from time import monotonic, sleep
 from typing import TYPE_CHECKING, Any, Final
@@ -197,24 +198,20 @@ class Page:
             limit_concurrency=_MOST_CONNECTIONS,
             timeout_graceful_shutdown=1,
         )
-        logger = logging.getLogger("uvicorn.error")
-        before = logger.level
-        logger.setLevel(logging.CRITICAL)
+        family = AF_INET6 if ":" in host else AF_INET
         try:
-            socket = config.bind_socket()
-        except (SystemExit, OSError):
+            opened = create_server((host, port), family=family)
+        except OSError:
             raise ConfigError(
                 f"the page cannot be served on {host}:{port}: the port is taken, or the address is "
                 "not one of this machine; name another"
             ) from None
-        finally:
-            logger.setLevel(before)
-        logger.setLevel(logging.ERROR)
+        logging.getLogger("uvicorn.error").setLevel(logging.ERROR)
         shown = f"[{host}]" if ":" in host else host
-        self.name = f"http://{shown}:{socket.getsockname()[1]}/"
+        self.name = f"http://{shown}:{opened.getsockname()[1]}/"
         self._server = uvicorn.Server(config)
-        self._socket = socket
-        self._thread = Thread(target=self._server.run, args=([socket],), name="page", daemon=True)
+        self._socket = opened
+        self._thread = Thread(target=self._server.run, args=([opened],), name="page", daemon=True)
         self._thread.start()
         until = monotonic() + _BEGINNING
         while not self._server.started and self._thread.is_alive() and monotonic() < until:
