@@ -211,12 +211,14 @@ def weigh_checked(drive: Drive, vehicle: Vehicle, method: str, settings: Any = N
         return found
     if left.status is not Status.CONVERGED:
         return found
-    if found.status is Status.CONVERGED and left.std > LEFT_OUT * found.std:
+    with_it = found.result
+    assert with_it is not None
+    if found.status is Status.CONVERGED and with_it.std <= left.std:
         return found
-    why = found.reason or phrase("wider", mass=found.mass, half=1.96 * found.std)
-    of_sensor = (p for p in found.problems if p.id.startswith("imu.") and p not in left.problems)
-    problems = (Problem.of("imu.left_out", why=why), *of_sensor, *left.problems)
-    return replace(left, problems=problems)
+    why = Problem.of("imu.left_out", mass=with_it.mass, half=1.96 * with_it.std)
+    noted = (*found.problems, *([found.refusal] if found.refusal else []))
+    of_sensor = (p for p in noted if p.id.startswith("imu.") and p not in left.problems)
+    return replace(left, problems=(why, *of_sensor, *left.problems))
 
 
 NOISY: Final = ("motion.wide", "imu.noise")
@@ -224,10 +226,8 @@ NOISY: Final = ("motion.wide", "imu.noise")
 
 NOISY_STD: Final = 0.05
 """Standard deviation of a mass from which the inertial sensor may be to blame for it [-]: without
-one, a calibrated vehicle is weighed to some 3 to 5 %."""
-
-LEFT_OUT: Final = 0.8
-"""A mass without the sensor counts if its standard deviation is less by this [-]."""
+one, a calibrated vehicle is weighed to some 3 to 5 %. Of the corpus 26 drives are weighed so, 4 of
+them undamaged: all intervals hold."""
 
 
 def _by_noise(found: Weighing) -> bool:
