@@ -49,11 +49,6 @@ FREEDOM: Final = 6.0
 it: the likeliest are 6.8, of 521 masses of 32 vehicles of two simulators through four kinds of
 equipment."""
 
-ALIASED: Final = 0.03
-"""An inertial sensor with samples further apart aliases, and all parts of a drive are off alike
-[s]: of 61 masses of the corpus at 10 and 20 Hz, two were silently wrong where parts that agreed
-made them surer."""
-
 STEPLESS_STD: Final = 0.035
 """How far masses of one vehicle with a stepless gearbox scatter from drive to drive by the losses
 of belt and pump, relative [-]: eight drives of two vehicles of the second model, on other
@@ -191,8 +186,7 @@ def self_weighed(
 def part_scatter(problem: Problem, vehicle: Vehicle) -> float:
     """How parts of a calibration's drives scatter, over what the filter says of it [-].
 
-    Each drive is weighed in `PARTS` of as many rows. Of a slow inertial sensor it is at least
-    `UNMODELLED`.
+    Each drive is weighed in `PARTS` of as many rows.
 
     Parameters
     ----------
@@ -225,10 +219,7 @@ def part_scatter(problem: Problem, vehicle: Vehicle) -> float:
         off = np.array(ratios) - np.average(ratios, weights=1.0 / np.array(variances))
         squares += float(np.sum(off**2 / variances))
         freedom += len(ratios) - 1
-    factor = math.sqrt(squares / freedom)
-    sensors = [recording.drive.get("accel_x") for recording in problem.recordings]
-    aliased = any(sensor is not None and sensor.period > ALIASED for sensor in sensors)
-    return max(factor, UNMODELLED) if aliased else factor
+    return math.sqrt(squares / freedom)
 
 
 class _Found(NamedTuple):

@@ -1,7 +1,7 @@
 """Accessories that are switched on and off: a compressor takes the same power whenever it is on.
 
-A torque that is reported at the crank counts it as traction, and so does engine load. In its clutch's
-time, a quarter of a minute, it looks like a hill.
+A torque that is reported at the crank counts it as traction, and so does engine load. In its
+clutch's time, a quarter of a minute, it looks like a hill.
 """
 
 from __future__ import annotations
@@ -32,8 +32,9 @@ POWER_SPREAD: Final = 0.6
 """Standard deviation of its logarithm [-]."""
 
 KNOWN_SPREAD: Final = 0.15
-"""The same where the calibration has shown the power [-]: 39 that drives of eight simulated vehicles
-showed with a good sensor are within 0.07 (RMS) of the median of their vehicle, 0.21 at most."""
+"""The same where the calibration has shown the power [-]: 39 that drives of eight simulated
+vehicles showed with a good sensor are within 0.07 (RMS) of the median of their vehicle, 0.21 at
+most."""
 
 TRIED: Final = (-1.0, 0.0, 1.0)
 """Powers that are tried first, in standard deviations [-]."""
