@@ -202,8 +202,9 @@ def weigh_checked(drive: Drive, vehicle: Vehicle, method: str, settings: Any = N
     settings : of the estimator; its defaults when None
     """
     found = _weigh_all(drive, vehicle, method, settings)
-    less = without_accelerometer(drive)
-    if len(less.signals) == len(drive.signals) or not _by_noise(found):
+    less, made = without_accelerometer(drive), found.estimator
+    without = made.by_speed or made.speed_alone or len(less.signals) == len(drive.signals)
+    if without or not _by_noise(found):
         return found
     try:
         left = _weigh_all(less, vehicle, method, settings)
