@@ -227,7 +227,7 @@ NOISY: Final = ("motion.wide", "imu.noise")
 
 NOISY_STD: Final = 0.05
 """Standard deviation of a mass from which the inertial sensor may be to blame for it [-]: without
-one, a calibrated vehicle is weighed to some 3 to 5 %. Of the corpus 26 drives are weighed so, 4 of
+one, a calibrated vehicle is weighed to some 3 to 5 %. Of the corpus 28 drives are weighed so, 5 of
 them undamaged: all intervals hold."""
 
 
