@@ -8,7 +8,6 @@ import pytest
 
 from weighbridge import Drive, Signal, read_drive
 from weighbridge.checks import check_drive
-from weighbridge.checks.inertial import _turns
 
 BMW_MAPPING = Path(__file__).resolve().parents[2] / "examples" / "bmw-i3" / "mapping.toml"
 SEAT_MAPPING = {
@@ -119,12 +118,16 @@ def hills(shared_data):
             Signal("gnss_speed", t, np.hypot(rows[:, 14], rows[:, 15])),
         )
 
+    edges = np.arange(time[0], time[-1], 2.0)
+    north, east = (np.diff(np.interp(edges, time, np.radians(rows[:, k]))) for k in (1, 2))
+    east *= np.cos(np.radians(rows[0, 1]))
+    turn, middle = np.diff(np.unwrap(np.arctan2(east, north))), edges[1:-1]
+    fast = 6.37e6 * np.hypot(north, east) > 8.0
+    bend = (np.abs(turn) > 0.1) & fast[1:] & fast[:-1]
+
     def agreement(offset):
-        t, change = _turns(joined(offset))
-        middle = 0.5 * (t[1:] + t[:-1])
-        bend = np.abs(change) > 0.1
-        yaw = imu.signals["gyro_z"].at(middle)
-        return np.corrcoef(np.nan_to_num(yaw[bend]), change[bend])[0, 1]
+        yaw = imu.signals["gyro_z"].at(middle + offset)
+        return np.corrcoef(np.nan_to_num(yaw[bend]), turn[bend])[0, 1]
 
     return joined(min(np.arange(-10.0, 10.0, 0.5), key=agreement))
 

@@ -5,13 +5,17 @@ import pytest
 
 from weighbridge import Drive, Signal
 from weighbridge.checks import correct_drive
-from weighbridge.signals.held import renewed, without_repeats
 
 
 def held(time, period, values, rng=None):
     """Repeat values of a clock of ``period`` in the rows at ``time``, as a logger does."""
     last = np.floor(time / period + 1e-9).astype(int)
     return values[last]
+
+
+def judged(signal):
+    """Return what is kept of a signal."""
+    return correct_drive(Drive("d", {signal.name: signal})).signals[signal.name]
 
 
 def changes(x):
@@ -26,12 +30,12 @@ def test_repeats_of_a_slower_source_are_one_value_each(row, period, step):
     source = np.cumsum(rng.normal(size=3002)) * period
     if step:
         source = step * np.round(source / step)
-    x = held(time, period, source)
-    new, found = renewed(time, changes(x))
-    assert found == pytest.approx(period, rel=0.02)
-    assert np.count_nonzero(new) == pytest.approx(600.0 / period, rel=0.03)
+    x = held(time, period, source / np.ptp(source))
+    kept = judged(Signal("altitude", time, x))
+    assert kept.duration / (len(kept) - 1) == pytest.approx(period, rel=0.02)
+    assert len(kept) == pytest.approx(600.0 / period, rel=0.03)
     # Nothing is lost: each change of the values is there.
-    assert new[changes(x)].all()
+    assert np.isin(time[changes(x)], kept.time).all()
 
 
 @pytest.mark.parametrize("step", [1e-6, 1.0])
@@ -43,9 +47,7 @@ def test_a_coarse_speed_is_no_repeated_one(step, pull):
     slow = np.interp(time, np.arange(0.0, 910.0, 10.0), rng.normal(size=91)) * pull
     speed = np.clip(40.0 + 3.6 * np.cumsum(slow) * 0.1, 0.0, None)
     x = step * np.round(speed / step)
-    new, period = renewed(time, changes(x))
-    assert period == 0.0
-    assert new.all()
+    assert len(judged(Signal("vehicle_speed", time, x / 3.6))) == time.size
 
 
 def test_fixes_in_a_fast_table_are_left_once_with_all_they_say():
@@ -58,12 +60,12 @@ def test_fixes_in_a_fast_table_are_left_once_with_all_they_say():
     }
     signals = {n: Signal(n, time, held(time, 1.0, v)) for n, v in fixes.items()}
     speed = Signal("vehicle_speed", time, np.abs(np.cumsum(rng.normal(size=time.size))))
-    drive = without_repeats(Drive("held", {**signals, "vehicle_speed": speed}))
+    drive = correct_drive(Drive("held", {**signals, "vehicle_speed": speed}))
     for name, values in fixes.items():
         assert np.array_equal(drive.signals[name].values, values[:300]), name
         assert np.array_equal(drive.signals[name].time, np.arange(300.0)), name
     assert len(drive.signals["vehicle_speed"]) == time.size
-    assert not drive.problems
+    assert not any(p.id == "range.repeats" for p in drive.problems)
 
 
 def test_a_torque_that_is_renewed_slowly_is_reported(short_drive):

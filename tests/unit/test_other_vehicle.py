@@ -8,7 +8,7 @@ import pytest
 
 import weighbridge as wb
 from weighbridge import Signal
-from weighbridge.checks.vehicle import check_vehicle
+from weighbridge.checks import check_drive
 from weighbridge.vehicle.known import Known, describe
 
 
@@ -56,6 +56,6 @@ def test_another_reference_torque_than_that_of_the_file_is_told(short_drive, tol
         Signal("reference_torque", time, np.full(time.size, told))
     )
     van = describe(Known(kind="van", torque="percent", reference_torque=400.0)).vehicle
-    found = [p for p in check_vehicle(drive, van) if p.signal == "reference_torque"]
+    found = [p for p in check_drive(drive, van) if p.signal == "reference_torque"]
     assert len(found) == known
     assert all(p.id == "torque.reference_file" for p in found)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from weighbridge import Drive, Signal, Vehicle
-from weighbridge.checks.needed import needed
+from weighbridge.checks import check_drive
 from weighbridge.vehicle.model import Driveline, Provenance, RoadLoad, TorqueModel
 from weighbridge.vehicle.road import Origin, Value
 
@@ -71,7 +71,11 @@ def test_a_measured_torque_that_is_stated_is_the_one_needed():
     """Without a word in the file the better source of the drive would be taken, with one not."""
     clock = np.arange(0.0, 60.0)
     names = ("engine_torque_fraction", "reference_torque", "engine_speed", "vehicle_speed")
-    drive = Drive("d", {name: Signal(name, clock, np.ones(60)) for name in names})
-    assert "engine_torque_fraction" in needed(drive, VAN)
+    drive = Drive("d", {name: Signal(name, clock, np.full(60, 40.0)) for name in names})
+
+    def serious(vehicle):
+        return {p.signal for p in check_drive(drive, vehicle) if p.serious}
+
+    assert "engine_torque_fraction" in serious(VAN)
     stated = replace(VAN, torque=TorqueModel(source="measured"))
-    assert "engine_torque_fraction" not in needed(drive, stated)
+    assert "engine_torque_fraction" not in serious(stated)
