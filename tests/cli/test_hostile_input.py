@@ -310,7 +310,7 @@ def test_loops_devices_and_what_is_no_file(refused, tmp_path):
         'BO_ 291 M: 999999999 A\n SG_ s : 0|8@1+ (1,0) [0|0] "km/h" A\n',
         f'BO_ {"9" * 5000} M: 8 A\n SG_ s : 0|8@1+ (1,0) [0|0] "km/h" A\n',
         f'BO_ 291 M: 8 A\n SG_ s : 0|{"9" * 5000}@1+ (1,0) [0|0] "km/h" A\n',
-        'BO_ 1 M: 8 A\n SG_ s : 0|8@1+ (1,0) [0|0] "' + "x" * 3_000_000,
+        'BO_ 1 M: 8 A\n SG_ s : 0|8@1+ (1,0) [0|0] "' + "x" * 300_000,
     ],
 )
 def test_databases(refused, tmp_path, body):

@@ -1,7 +1,7 @@
 """The second model keeps the laws of physics and drives as people do."""
 
 import sys
-from functools import cache
+from functools import lru_cache
 from pathlib import Path
 
 import numba
@@ -26,7 +26,8 @@ pytestmark = pytest.mark.skipif(
 KINDS = ("petrol", "diesel", "semi", "electric_car")
 
 
-@cache
+# Tests of a kind follow each other, so that one drive is held at a time.
+@lru_cache(maxsize=1)
 def driven(kind, style="ordinary"):
     # The lock-up of this automatic gearbox once chattered, and lost a third of the power.
     vehicle = random_vehicle(kind, 106 if kind == "petrol_automatic" else 3)
@@ -42,7 +43,7 @@ def share_that_moves(vehicle, mass):
     return vehicle.body.coupled_share * np.maximum(0.0, mass[0] - vehicle.body.reference_mass)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", KINDS, scope="module")
 def test_energy_closes(kind):
     vehicle, motion = driven(kind)
     speed, height, mass = columns(motion, "speed", "altitude", "mass")
@@ -56,7 +57,7 @@ def test_energy_closes(kind):
     assert abs(traction + coupled - sum(losses) - kinetic - potential) < 1e-3 * spent
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", KINDS, scope="module")
 def test_a_perfect_accelerometer_reads_acceleration_and_gravity(kind):
     vehicle, motion = driven(kind)
     table = imu(motion.out, vehicle, Logger(imu_quality=0.0), np.random.default_rng(1))
@@ -73,7 +74,7 @@ def test_a_perfect_accelerometer_reads_acceleration_and_gravity(kind):
     assert_allclose((along - accel - G * climb)[moving], 0.0, atol=0.02)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", KINDS, scope="module")
 def test_a_perfect_gyroscope_turns_the_vertical_as_a_rigid_body_does(kind):
     vehicle, motion = driven(kind)
     table = imu(motion.out, vehicle, Logger(imu_quality=0.0), np.random.default_rng(1))
@@ -92,7 +93,7 @@ def test_a_perfect_gyroscope_turns_the_vertical_as_a_rigid_body_does(kind):
     assert_allclose(np.sum(rate * vertical, axis=1), yaw_rate + rolled, atol=1e-9)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", KINDS, scope="module")
 def test_engine_and_wheels_turn_by_the_gear(kind):
     vehicle, motion = driven(kind)
     speed, gear, engine, slipping = columns(motion, "speed", "gear", "engine_speed", "clutch_open")
@@ -118,7 +119,7 @@ def seconds(motion, *names):
     return {name: block[keep] for name, block in blocks.items()}
 
 
-@pytest.mark.parametrize("kind", EVERY_KIND)
+@pytest.mark.parametrize("kind", EVERY_KIND, scope="module")
 def test_torque_of_the_engine_arrives_at_the_wheels(kind):
     vehicle, motion = driven(kind)
     side = ("clutch_torque", "pump_torque", "turbine_torque", "gearbox_loss")
@@ -150,7 +151,7 @@ def test_torque_of_the_engine_arrives_at_the_wheels(kind):
     )
 
 
-@pytest.mark.parametrize("kind", EVERY_KIND)
+@pytest.mark.parametrize("kind", EVERY_KIND, scope="module")
 def test_high_gears_lose_little_power(kind):
     vehicle, motion = driven(kind)
     x = seconds(motion, "engine_torque", "traction_force")
