@@ -1,4 +1,4 @@
-"""Kills at random points of a fleet on a scheduler and two workers started by hand."""
+"""Kills at random points of a fleet on a scheduler and workers started by hand."""
 
 import contextlib
 import json
@@ -158,13 +158,11 @@ def wait_until(process, results: Path, count: int, more: float) -> None:
     time.sleep(more)
 
 
-def test_a_scheduler_and_two_workers_started_by_hand(
-    cluster, tmp_path, tiny, scheduler, weighbridge
-):
-    """One worker and the scheduler are killed, and the command given again."""
+def test_a_scheduler_and_a_worker_started_by_hand(cluster, tmp_path, tiny, scheduler, weighbridge):
+    """The worker and then the scheduler are killed, and the command given again."""
     drives, cars = tiny
     results = tmp_path / "results"
-    process = begun(cluster.start(), drives, cars, results)
+    process = begun(cluster.start(workers=1), drives, cars, results)
     wait_until(process, results, 8, 0.0)
     cluster.kill_worker()
     wait_until(process, results, 16, 0.0)

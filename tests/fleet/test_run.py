@@ -1,5 +1,6 @@
 """A fleet through a cluster: all rows, once, in whatever order and after whatever went wrong."""
 
+import importlib
 import os
 import signal
 import subprocess
@@ -180,6 +181,8 @@ def test_an_interruption_ends_cleanly(tiny, tmp_path, whole, scheduler):
 
 
 def test_a_drive_that_kills_its_worker_has_a_row(tiny, tmp_path):
+    # Its defaults are there before one of them is set for a while.
+    importlib.import_module("distributed")
     drives, cars = tiny
     home = copy_of(drives / "van0", tmp_path / "drives" / "van0")
     (home / "trip-0003").rename(home / "deadly")
