@@ -7,7 +7,7 @@ import shutil
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 # Before Numba is imported: compiled kernels are shared by all checkouts with the same sources.
 os.environ.setdefault(
@@ -22,16 +22,27 @@ import numpy as np
 import pytest
 
 import weighbridge as wb
-from tests.drives import keep_drives
 from tests.order import guards, is_long, longest_first
-from weighbridge import DriveError, read_drive, simulation
-from weighbridge.cli import main
-from weighbridge.simulation import SimulatedDrive, make_scenario
+
+if TYPE_CHECKING:
+    from weighbridge.simulation import SimulatedDrive
 
 # Programs that tests start need not compile all they import, each time.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
-keep_drives(Path(os.environ["NUMBA_CACHE_DIR"]))
+
+WORKER = "PYTEST_XDIST_WORKER" in os.environ
+
+
+def _keep_drives() -> None:
+    from tests.drives import keep_drives
+
+    keep_drives(Path(os.environ["NUMBA_CACHE_DIR"]))
+
+
+# The process that hands the tests out simulates nothing, and needs no compiler in its memory.
+if WORKER:
+    _keep_drives()
 
 CHROMIUM = next(
     filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
@@ -51,6 +62,12 @@ class Ran(NamedTuple):
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Add the option for tests that are left out otherwise."""
     parser.addoption("--long", action="store_true", help="run the tests of tests/long.toml too")
+
+
+def pytest_sessionstart(session: pytest.Session) -> None:
+    """Keep simulated drives where no worker runs the tests."""
+    if not (WORKER or session.config.getoption("numprocesses", None)):
+        _keep_drives()
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
@@ -81,9 +98,11 @@ def pytest_runtest_teardown(item: pytest.Item, nextitem: pytest.Item | None) -> 
 
 
 @pytest.fixture(scope="session")
-def short_drive() -> SimulatedDrive:
+def short_drive() -> "SimulatedDrive":
     """Return a short drive of a petrol car with 120 kg on board."""
-    return simulation.simulate_car(make_scenario("car-short", payload=120.0, seed=61))
+    from weighbridge import simulation
+
+    return simulation.simulate_car(simulation.make_scenario("car-short", payload=120.0, seed=61))
 
 
 @pytest.fixture(scope="session")
@@ -118,6 +137,7 @@ def foreign_simulator(shared_data: Path) -> Path:
 @pytest.fixture
 def weighbridge(capsys, monkeypatch) -> Callable[..., Ran]:
     """Run the command line in this process, error handling included."""
+    from weighbridge.cli import main
 
     def run(*words: object) -> Ran:
         monkeypatch.setattr(sys, "argv", ["weighbridge", *(str(w) for w in words)])
@@ -139,8 +159,8 @@ def assert_salvaged() -> Callable[[Path], None]:
     def check(path: Path) -> None:
         said, found = "one sentence", {}
         try:
-            found = read_drive(path).signals
-        except DriveError as e:
+            found = wb.read_drive(path).signals
+        except wb.DriveError as e:
             said = str(e)
         assert len(said.splitlines()) == 1
         for signal in found.values():
