@@ -204,7 +204,7 @@ def folder() -> Path:
     return here
 
 
-@lru_cache(maxsize=3)
+@lru_cache(maxsize=1)
 def subject(name: str) -> Subject:
     """Return a subject by its name."""
     if name in READ:
