@@ -20,8 +20,8 @@ def write():
 sys.meta_path.insert(0, Interrupted())
 sys.argv = ["weighbridge", "--version"]
 threading.Thread(target=write).start()
-from weighbridge.__main__ import run
-run()
+import runpy
+runpy.run_module("weighbridge", run_name="__main__")
 """
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from weighbridge.version import VERSION
+from weighbridge import __version__
 
 ROOT = Path(__file__).parents[2]
 COMPILED = "__pycache__"
@@ -27,7 +27,7 @@ def built(tmp_path_factory) -> Path:
 
 @pytest.fixture(scope="module")
 def inside(built) -> set[str]:
-    with zipfile.ZipFile(built / f"weighbridge-{VERSION}-py3-none-any.whl") as wheel:
+    with zipfile.ZipFile(built / f"weighbridge-{__version__}-py3-none-any.whl") as wheel:
         return set(wheel.namelist())
 
 
@@ -55,7 +55,7 @@ def test_the_wheel_has_each_file_of_the_package(inside):
 
 @pytest.mark.slow
 def test_the_wheel_has_the_licence_of_each_script_in_it(inside):
-    place = f"weighbridge-{VERSION}.dist-info/licenses"
+    place = f"weighbridge-{__version__}.dist-info/licenses"
     below = (ROOT / "src").rglob("LICENSE")
     stated = {f"{place}/{path.relative_to(ROOT).as_posix()}" for path in below}
     assert len(stated) == 2
@@ -64,7 +64,7 @@ def test_the_wheel_has_the_licence_of_each_script_in_it(inside):
 
 @pytest.mark.slow
 def test_the_source_has_what_builds_and_tests_it(built):
-    with tarfile.open(built / f"weighbridge-{VERSION}.tar.gz") as source:
+    with tarfile.open(built / f"weighbridge-{__version__}.tar.gz") as source:
         names = {name.partition("/")[2] for name in source.getnames()}
     wanted = {"pyproject.toml", "README.md", "LICENSE", "mkdocs.yml", "website/hooks.py"}
     assert wanted | {"tests/conftest.py", "docs/index.md", "examples/bus/vehicle.toml"} <= names

@@ -12,9 +12,12 @@ from weighbridge.vehicle.description import can_weigh, tell
 from weighbridge.vehicle.file import save_vehicle
 from weighbridge.vehicle.known import Known, describe
 from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
-from weighbridge.vehicle.tyre import rolling_radius
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
+
+
+def rolling_radius(size):
+    return describe(Known(tyre=size)).vehicle.driveline.wheel_radius
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,6 @@ from weighbridge import ConfigError, Signal, weigh
 from weighbridge.simulation import SimulatedCar, make_scenario, simulate_car
 from weighbridge.vehicle.classes import VEHICLE_CLASSES
 from weighbridge.vehicle.known import Known, describe
-from weighbridge.vehicle.tyre import rolling_radius
 
 GEARS = (2.58, 1.93, 1.55, 1.33, 1.20, 1.11)
 FINAL_DRIVE = 1.71 * 2.6
@@ -78,4 +77,5 @@ def test_light_classes_take_masses_that_a_car_cannot_have(kind):
     [("180/55 ZR17", 630.0), ("120/70 ZR17", 600.0), ("90/90-21", 695.0), ("140/70-14", 552.0)],
 )
 def test_tyres_of_motorcycles(size, diameter):
-    assert 2000.0 * rolling_radius(size) == pytest.approx(0.97 * diameter, rel=0.01)
+    radius = describe(Known(tyre=size)).vehicle.driveline.wheel_radius
+    assert 2000.0 * radius == pytest.approx(0.97 * diameter, rel=0.01)

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from tests import licences
 
-from weighbridge.version import VERSION
+from weighbridge import __version__
 
 ROOT = Path(__file__).parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
@@ -29,14 +29,14 @@ def test_the_version_stands_in_one_place():
     assert "version" not in PROJECT["project"]
     where = PROJECT["tool"]["hatch"]["version"]
     found = re.search(where["pattern"], text(where["path"]), re.M)
-    assert found["version"] == VERSION
+    assert found["version"] == __version__
 
 
 def test_changelog_and_citation_agree_with_the_version():
     version, date = released()
     citation = text("CITATION.cff")
-    assert version == VERSION
-    assert re.search(r"^version: (.+)$", citation, re.M)[1] == VERSION
+    assert version == __version__
+    assert re.search(r"^version: (.+)$", citation, re.M)[1] == __version__
     assert re.search(r"^date-released: (.+)$", citation, re.M)[1] == date
 
 

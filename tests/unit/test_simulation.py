@@ -1,6 +1,5 @@
 import re
 from dataclasses import fields, replace
-from typing import get_type_hints
 
 import numpy as np
 import polars as pl
@@ -9,7 +8,6 @@ from numpy.testing import assert_allclose, assert_array_equal
 from tests.noted import error
 
 from weighbridge import ConfigError, read_drive
-from weighbridge.cli.simulate import simulate
 from weighbridge.signals import QUANTITIES
 from weighbridge.simulation import (
     ABOUT,
@@ -656,10 +654,9 @@ def test_brake_switch_feels_a_light_foot():
     assert shares[0] > 1.5 * shares[1]
 
 
-def test_every_scenario_is_described():
+def test_every_scenario_is_described(weighbridge):
     assert set(ABOUT) == set(SCENARIOS)
-    hints = get_type_hints(simulate, include_extras=True)
-    told = hints["scenario"].__metadata__[0].help
+    told = weighbridge("simulate", "--help").out
     assert set(SCENARIOS) <= set(re.findall(r"[a-z-]+", told))
 
 
