@@ -44,12 +44,25 @@ def check_frozen(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
 
 
 def _reported(names: list[str], axis: Signal, speed: Signal | None) -> Problem:
-    """Report axes that froze together, such as ``axis``."""
+    """Report axes that froze together, such as ``axis``, or a gyro that is at its limit again."""
     stretches = frozen_stretches(axis, speed)
     lengths = stretches[:, 1] - stretches[:, 0]
     total = float(lengths.sum())
     k = int(np.argmax(lengths))
     left = axis.duration - total
+    repeated = np.abs(axis.values[axis.time.searchsorted(stretches[:, 0])])
+    limit = float(repeated[0])
+    again = lengths.size > 1 or limit == float(np.abs(axis.values).max())
+    if again and axis.name in IMU_SIGNALS[3:] and limit and (repeated == limit).all():
+        return Problem.of(
+            "imu.gyro_clipped",
+            axis.name,
+            start=stretches[0, 0],
+            end=stretches[-1, 1],
+            limit=limit,
+            count=lengths.size,
+            total=total,
+        )
     too_little = left < min(_LEAST, 0.5 * axis.duration)
     whole = set(names) == set(IMU_SIGNALS)
     return Problem.of(

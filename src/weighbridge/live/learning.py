@@ -116,10 +116,7 @@ def learn(drive: Drive, vehicle: Vehicle, until: float, step: float) -> Learned:
             problems=weighing.problems,
             std_found=_std_found(weighing),
         )
-    if early is not None:
-        setup, state, problems = None, None, weighing.problems
-    else:
-        setup, state, problems = _set_up(weighing, drive, until, step)
+    setup, state = (None, None) if early is not None else _set_up(weighing, drive, until, step)
     return Learned(
         until=until,
         since=weighing.segments[-1].start if weighing.load_changed else drive.start,
@@ -131,7 +128,7 @@ def learn(drive: Drive, vehicle: Vehicle, until: float, step: float) -> Learned:
         inconsistent=False,
         refusal=None,
         early=early,
-        problems=problems,
+        problems=weighing.problems,
         std_found=_std_found(weighing),
     )
 
@@ -145,16 +142,17 @@ def _early(drive: Drive, vehicle: Vehicle) -> Weighing:
 
 def _set_up(
     weighing: Weighing, drive: Drive, until: float, step: float
-) -> tuple[ForwardSetup | None, ForwardState | None, tuple[Problem, ...]]:
+) -> tuple[ForwardSetup | None, ForwardState | None]:
     """Set up the stages; all records so far are one step of theirs.
 
     The records are as they came: what the checks of the weighing left out or moved is in them.
+    Without an inertial sensor, or where it was left out, there are no stages.
     """
     try:
         setup = forward.identify_forward(weighing, step)
-    except WeighbridgeError as error:
-        return None, None, (*weighing.problems, Problem.from_error(error))
-    return setup, forward.resume(weighing, drive, until, setup), weighing.problems
+    except WeighbridgeError:
+        return None, None
+    return setup, forward.resume(weighing, drive, until, setup)
 
 
 def _floor(weighing: Weighing) -> float:

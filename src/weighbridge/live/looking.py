@@ -103,8 +103,9 @@ class Look:
         far = abs(found.mass - self.mass) > max(
             FAR * math.hypot(self.std, found.std), LEAST_FAR * found.mass
         )
-        # Where the records hold all of this load, nothing is known beside them.
-        whole = self.kept_from <= max(since, found.since)
+        # Where the records hold all of this load, nothing is known beside them. Without a setup
+        # the stages' inertial sensor was left out.
+        whole = self.kept_from <= max(since, found.since) or found.setup is None
         return math.isnan(self.mass) or far or whole or found.std <= 1.05 * self.std
 
     def state(self) -> ForwardState | None:

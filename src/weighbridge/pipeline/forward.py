@@ -148,7 +148,11 @@ def identify_forward(weighing: Weighing, step: float = STEP) -> ForwardSetup:
         vehicle=vehicle,
         navigation=_holding(navigation, motion.squat),
         force=replace(force, foot=replace(force.foot, ahead=AHEAD)),
-        joint=identify_joint(result.filter_input, result.sizes),
+        # What a finding leaves uncertain is uncertain on the way as well.
+        joint=replace(
+            identify_joint(result.filter_input, result.sizes),
+            systematic_std=result.systematic_std / result.mass,
+        ),
         delay=result.balance.delay,
         period=float(np.median(np.diff(time))),
         step=step,

@@ -222,8 +222,9 @@ def weigh_checked(drive: Drive, vehicle: Vehicle, method: str, settings: Any = N
     return replace(left, problems=(why, *of_sensor, *left.problems))
 
 
-NOISY: Final = ("motion.wide", "imu.noise")
-"""Reasons for no mass that an inertial sensor may be to blame for."""
+NOISY: Final = ("motion.wide", "imu.noise", "gear.drift")
+"""Reasons for no mass that an inertial sensor may be to blame for: its noise, or that it is at its
+limit in bends, so that the motion drifts off the gears."""
 
 NOISY_STD: Final = 0.05
 """Standard deviation of a mass from which the inertial sensor may be to blame for it [-]: without
