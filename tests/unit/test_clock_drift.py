@@ -255,6 +255,9 @@ def test_a_gap_of_the_inertial_sensor_leaks_no_zeros(made):
     """A lag passes on what stood in the gap; what is valid behind it must not hold any of that."""
     gaps = [(at, at + 2.0) for at in np.arange(200.0, 1300.0, 50.0)]
     whole = lagged_motion(find_motion(made.drive), 0.3)
+    # What brings no new row leaves all as it was.
+    again = lagged_motion(find_motion(made.drive), 0.3, whole)
+    np.testing.assert_array_equal(again.specific_force, whole.specific_force)
     gapped = lagged_motion(find_motion(without_inertial(made.drive, gaps)), 0.3)
     behind = np.logical_or.reduce([(whole.time > b) & (whole.time < b + 2.0) for _, b in gaps])
     rows = behind & gapped.valid & whole.valid

@@ -85,7 +85,9 @@ def _lagged(motion: Motion, name: str, lag: float, before: Motion | None) -> Flo
     silent = np.diff(motion.time) * motion.rate > BREAK
     anew = np.flatnonzero(silent) + 1
     for first, last in itertools.pairwise((known, *anew[anew > known], values.size)):
-        start = found[first - 1] if first > 0 and not silent[first - 1] else None
+        # Where no row is new, there is none to begin with.
+        goes_on = 0 < first < values.size and not silent[first - 1]
+        start = found[first - 1] if goes_on else None
         found[first:last] = behind(values[first:last], motion.rate, lag, start)
     return found
 
