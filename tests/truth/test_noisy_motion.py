@@ -39,23 +39,27 @@ def weighed(seed, n=400):
     def put_back(variance):
         return mass * (1.0 + attenuation(weight, variance, var[:, 0], np.zeros(n, dtype=bool))[-1])
 
-    def by_scatter(unanswered, grade_std):
-        known = np.full(n, 30.0**2), np.full(n, grade_std), unanswered, mass, var[-1, 0]
-        return put_back(unmeasured_noise(weight, *known))
+    def by_scatter(short, grade_std, fast_var=noise):
+        known = np.full(n, 30.0**2), np.full(n, short), np.full(n, grade_std), mass, var[-1, 0]
+        return put_back(unmeasured_noise(weight, fast_var, *known))
 
     by_size = put_back(np.full(n, NOISE**2))
-    return mass, by_size, by_scatter(1.0, NOISE), by_scatter(0.5, NOISE), by_scatter(1.0, 0.0)
+    by_whole = by_scatter(short=True, grade_std=NOISE, fast_var=np.zeros(n))
+    by_none = by_scatter(short=False, grade_std=NOISE, fast_var=np.zeros(n))
+    return mass, by_size, by_scatter(short=False, grade_std=NOISE), by_whole, by_none
 
 
 def test_the_mean_over_many_drives_is_right_once_the_noise_is_put_back():
     found = np.mean([weighed(seed) for seed in range(60)], axis=0) / MASS - 1.0
-    as_it_is, by_size, by_scatter, by_half, by_true_heights = found
+    as_it_is, by_size, by_fast, by_whole, by_none = found
     assert -0.07 < as_it_is < -0.03
     # To first order: what is left is the square of what was taken.
     assert by_size == pytest.approx(0.0, abs=0.006)
-    assert by_scatter == pytest.approx(0.0, abs=0.006)
-    assert by_half == pytest.approx(0.5 * as_it_is, abs=0.006)
-    assert by_true_heights == pytest.approx(as_it_is, abs=1e-6)
+    assert by_fast == pytest.approx(0.0, abs=0.006)
+    # Where power is short all of the scatter counts, whatever is fast in it.
+    assert by_whole == pytest.approx(0.0, abs=0.006)
+    # A driver who answers what lasts leaves no noise.
+    assert by_none == pytest.approx(as_it_is, abs=1e-6)
 
 
 def test_each_load_counts_its_own_windows():

@@ -29,14 +29,6 @@ CAR_ENGINE_INERTIA: Final = 0.15
 """That of a car's engine [kg m^2] (Jensen 2022, sec. 7.3)."""
 
 
-UNANSWERED: Final = 0.75
-"""Of trucks [-]. With 0, 0.5, 0.75 and 1 sixteen drives of two trucks of the second
-simulator, by data sheet and with heights that wander, came out 17 and 6 % light, 1 and 8 % heavy in
-the mean; five of another simulator's truck, by which the cause was found, 17 and 6 % light, 0 and
-7 % heavy. Cars and buses have power to answer a hill: fourteen drives of cars, calibrated alike,
-had 2.8 % (RMS) with 0 and 4.3 % with 0.75."""
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VehicleClass:
     """What vehicles of a class have in common.
@@ -69,8 +61,8 @@ class VehicleClass:
         differ more
     boarding_std : change of the mass at a short stop, standard deviation relative to it [-]
     retarded : a retarder or an engine brake may slow it without the brake pedal
-    unanswered : part of the scatter between force and a motion without accelerometer that is noise
-        of the motion [-]: short of power, it slows down on a hill that its heights smooth away
+    underpowered : it slows down on hills, which biases masses without an accelerometer
+        (`weighbridge.estimators.noisy_motion.unmeasured_noise`)
     motor_helps : a motor drives it beside an engine, so that no torque of the engine shows all
     """
 
@@ -98,7 +90,7 @@ class VehicleClass:
     scatter_std: float = 0.0
     boarding_std: float = 0.0
     retarded: bool = False
-    unanswered: float = 0.0
+    underpowered: bool = False
     motor_helps: bool = False
 
     def road_prior(self, *, single_speed: bool) -> tuple[Floats, Floats]:
@@ -295,7 +287,7 @@ VEHICLE_CLASSES: Final = Registry(
             fastest=45.0,
             strongest=60.0,
             retarded=True,
-            unanswered=UNANSWERED,
+            underpowered=True,
         ),
     ),
 )

@@ -58,6 +58,7 @@ from weighbridge.estimators.noisy_motion import (
     attenuation,
     learnt_noise,
     left_open,
+    short_of_power,
     unmeasured_noise,
 )
 from weighbridge.estimators.squat import ResidualSquat, residual_squat
@@ -392,17 +393,17 @@ def _attenuating(
     balance: ForceBalance, vehicle: Vehicle, cut: Windows, solved: _Solved, noise: MotionNoise
 ) -> tuple[Floats, float]:
     """Noise of the motion by window (m,) [m^2/s^4], and how unsure its size is [-]."""
-    motion, unanswered = balance.motion, vehicle.of_class.unanswered
-    if motion.source not in BY_SPEED or not unanswered:
+    table, motion = balance.table, balance.motion
+    if motion.source not in BY_SPEED or not vehicle.of_class.underpowered:
         # More noise than usual is more likely the torque's; less is less on both sides.
         shown = noise.variance if noise.learnt else min(solved.fast, 1.0) ** 2 * noise.variance
         return np.full(cut.count.size, shown), noise.std / noise.variance
-    time = cut.mean(balance.table.time)
     found = unmeasured_noise(
         np.where(solved.taken, solved.weight, 0.0),
-        min(solved.fast, 1.0) ** 2 * cut.mean(balance.table.force_std**2) / cut.count,
-        GRAVITY * np.interp(time, motion.time, motion.grade_std),
-        unanswered,
+        solved.noise,
+        min(solved.fast, 1.0) ** 2 * cut.mean(table.force_std**2) / cut.count,
+        short_of_power(cut.mean(np.nan_to_num(table.torque))),
+        GRAVITY * np.interp(cut.mean(table.time), motion.time, motion.grade_std),
         float(solved.x[-1, 0]),
         float(solved.var[-1, 0]),
     )
@@ -489,7 +490,7 @@ def _systematic_std(balance: ForceBalance, vehicle: Vehicle, mass: float) -> flo
     if lacks_accelerometer(vehicle, balance.motion):
         left = float(np.hypot(left, OTHER_MOTION_STD[balance.motion.source]))
     if by_data_sheet(vehicle) and balance.motion.source in BY_SPEED:
-        if not vehicle.of_class.unanswered:
+        if not vehicle.of_class.underpowered:
             left = float(np.hypot(left, UNCALIBRATED_MOTION_STD[balance.motion.source]))
         if balance.retarder_untold:
             left = float(np.hypot(left, UNTOLD_RETARDER_STD))
