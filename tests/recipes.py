@@ -1,20 +1,21 @@
-"""Code and entry points of the recipes in CONTRIBUTING.md."""
+"""Modules and entry points of `examples/extension`, which the recipes in CONTRIBUTING.md name."""
 
-import re
+import tomllib
 from pathlib import Path
 
-GUIDE = (Path(__file__).parents[1] / "CONTRIBUTING.md").read_text(encoding="utf-8")
+PACKAGE = Path(__file__).parents[1] / "examples" / "extension"
 
 
 def code(name: str) -> str:
-    """Return the block of Python whose first line names a file."""
-    (found,) = re.findall(rf"```python\n# {re.escape(name)}\n(.*?)```", GUIDE, re.DOTALL)
-    return found
+    """Return the text of a module."""
+    return (PACKAGE / name).read_text(encoding="utf-8")
 
 
 def entry_points() -> dict[str, str]:
-    """Return the entry points that the recipes write into pyproject.toml, by their group."""
-    blocks = re.findall(
-        r'```toml\n\[project\.entry-points\."([\w.]+)"\]\n(\w+) = "([\w:]+)"\n```', GUIDE
-    )
-    return {group: f"{name} = {target}" for group, name, target in blocks}
+    """Return the line of each entry point, by its group."""
+    project = tomllib.loads((PACKAGE / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    return {
+        group: f"{name} = {target}"
+        for group, points in project["entry-points"].items()
+        for name, target in points.items()
+    }

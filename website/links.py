@@ -36,7 +36,7 @@ def outside_pages() -> dict[str, Path]:
             found[f"studies/{study.name}"] = study
     for figure in sorted((HOME / "studies" / "figures").glob("*.png")):
         found[f"studies/figures/{figure.name}"] = figure
-    examples = (p for p in (HOME / "examples").rglob("*") if p.suffix in (".toml", ".ino"))
+    examples = (p for p in (HOME / "examples").rglob("*") if p.suffix in (".toml", ".ino", ".py"))
     for example in sorted(examples):
         found[example.relative_to(HOME).as_posix()] = example
     return found

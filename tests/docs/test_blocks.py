@@ -24,10 +24,7 @@ MADE = {
 ELSEWHERE = {
     ("README.md", "bash"): "tests/cli/test_documents.py",
     ("README.md", "python"): "tests/cli/test_documents.py",
-    ("CONTRIBUTING.md", "python"): "tests/recipes.py",
-    ("CONTRIBUTING.md", "toml"): "tests/recipes.py",
     ("docs/benchmark.md", "bash"): "tests/cli/test_benchmark.py",
-    ("docs/benchmark.md", "python"): "tests/cli/test_benchmark.py",
     ("docs/fleet_queries.md", "sql"): "tests/fleet/test_tables.py",
     ("docs/loggers.md", "bash"): "tests/recorded/test_loggers.py",
     ("docs/methods/nguyen2024.md", "python"): "tests/cli/test_documents.py",

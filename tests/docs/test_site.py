@@ -21,23 +21,29 @@ def test_every_public_name_is_in_the_reference():
     assert "Others" not in reference.groups()
 
 
-def imported(page: Path) -> set[str]:
-    """Return the names that the Python of a page imports from the package."""
-    blocks = re.findall(r"^ *```python\n(.*?)^ *```", page.read_text("utf-8"), re.M | re.S)
+def imported(code: str) -> set[str]:
+    """Return the names that Python code imports from the package."""
     return {
         f"{node.module}.{name.name}"
-        for block in blocks
-        for node in ast.walk(ast.parse(textwrap.dedent(block)))
+        for node in ast.walk(ast.parse(textwrap.dedent(code)))
         if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("weighbridge")
         for name in node.names
     }
 
 
+def codes(page: Path) -> list[str]:
+    """Return the blocks of Python of a page."""
+    return re.findall(r"^ *```python\n(.*?)^ *```", page.read_text("utf-8"), re.M | re.S)
+
+
 def test_what_pages_import_is_in_the_reference():
     pages = "\n".join(reference.python_pages().values())
     told = set(re.findall(r"^::: (\S+)$", pages, re.MULTILINE))
-    found = {page.name: imported(page) for page in links.pages()}
-    assert len(found["CONTRIBUTING.md"]) >= 15
+    extension = sorted((HOME / "examples" / "extension").glob("*.py"))
+    found = {path.name: imported(path.read_text("utf-8")) for path in extension}
+    assert len(set().union(*found.values())) >= 15
+    for page in links.pages():
+        found[page.name] = set().union(*map(imported, codes(page)))
     for name, names in found.items():
         assert names <= told, name
     for name in told:
