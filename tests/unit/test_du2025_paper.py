@@ -9,7 +9,7 @@ from weighbridge.estimators.settings import changed, parsed
 from weighbridge.papers import Reproduced, du2025
 from weighbridge.papers.du2025_claims import CLAIMS
 from weighbridge.papers.du2025_methods import BAND, FORMS, METHODS, PAPER_RMSE, READINGS
-from weighbridge.papers.du2025_told import swing, told
+from weighbridge.papers.du2025_running import running_error, swing
 
 SEED = 3
 
@@ -50,7 +50,10 @@ def test_the_printed_rolling_coefficient_alone_makes_all_methods_heavy(judged):
 
 
 def test_with_every_row_brakings_reach_the_least_squares(judged):
-    every, left = judged.printed_told["e1"]["robust-rls"], judged.printed_told["l1"]["robust-rls"]
+    every, left = (
+        judged.printed_running["e1"]["robust-rls"],
+        judged.printed_running["l1"]["robust-rls"],
+    )
     assert every.first > 0.15 > left.first
     assert every.swing > 0.5 > 2.0 * left.swing
     assert judged.printed["e1"]["robust-rls"] > 2.0 * judged.printed["l1"]["robust-rls"]
@@ -113,13 +116,13 @@ def test_a_braking_moves_the_least_squares_and_not_the_kalman_filter(judged):
         mass = track.running_mass[(track.time >= start + at) & (track.time <= start + at + 20.0)]
         expected = max(expected, np.ptp(np.append(mass, mass[0])) / mass[0])
     assert 0.4 * expected < swing(track, made) <= 1.02 * expected
-    printed = judged.printed_told["lt"]
+    printed = judged.printed_running["lt"]
     assert printed["robust-rls"].swing > 3.0 * printed["ekf"].swing
 
 
 def test_what_a_running_mass_does_is_told_from_its_rows(judged):
     track, mass = judged.tracks["robust-rls"], judged.true_mass
-    found = told(track, du2025.simulate(3000.0, SEED, as_paper=True), mass)
+    found = running_error(track, du2025.simulate(3000.0, SEED, as_paper=True), mass)
     since = track.time - track.time[0]
     error = np.abs(track.running_mass - mass)
     known = np.isfinite(error)
@@ -144,7 +147,7 @@ def test_each_sentence_of_the_text_is_judged_by_the_printed_runs(judged):
     form = "l1"
 
     def runs(**by_method):
-        usual = judged.printed_told[form]
+        usual = judged.printed_running[form]
         return {form: {m: replace(usual[m], **by_method[m.replace("-", "_")]) for m in METHODS}}
 
     least = {
@@ -160,7 +163,7 @@ def test_each_sentence_of_the_text_is_judged_by_the_printed_runs(judged):
     like = {"printed": {form: masses}, "printed_worst": {form: worst}}
     as_told = claimed(
         judged,
-        printed_told=runs(robust_rls=least, ekf=kalman, hybrid=kalman | {"slow": 40.0}),
+        printed_running=runs(robust_rls=least, ekf=kalman, hybrid=kalman | {"slow": 40.0}),
         **like,
     )
     assert {code for code, (_, so) in as_told.items() if not so} == {"twice"}
@@ -171,12 +174,13 @@ def test_each_sentence_of_the_text_is_judged_by_the_printed_runs(judged):
     worst = {form: dict.fromkeys(METHODS, 0.2)}
     turned = claimed(
         judged, printed={form: masses}, printed_worst=worst,
-        printed_told=runs(robust_rls=kalman | {"late": 40.0}, ekf=least, hybrid=kalman),
+        printed_running=runs(robust_rls=kalman | {"late": 40.0}, ekf=least, hybrid=kalman),
     )  # fmt: skip
     assert {code for code, (_, so) in turned.items() if so} == {"first", "steady", "loads"}
     assert turned["blend no-load"][0] == "250 of 200 and 300 kg: between them"
     never = claimed(
-        judged, printed_told=runs(robust_rls=least | {"steady_at": 1e3}, ekf=kalman, hybrid=kalman)
+        judged,
+        printed_running=runs(robust_rls=least | {"steady_at": 1e3}, ekf=kalman, hybrid=kalman),
     )
     assert never["steady"] == ("never", False)
     assert never["sooner"] == ("9 s; least squares never", True)

@@ -393,7 +393,7 @@ def estimate(
     _, running, var, information, mean_phi, mean_y, _ = kernel.run(
         initial_state(settings, params.window), table.time, phi, y, valid, params
     )
-    # Once told, a mass stays told: forgetting may leave less behind it later.
+    # Once reported, a mass stays reported: forgetting may leave less behind it later.
     most = np.maximum.accumulate(information) if information.size else information
     informed = most * params.window >= settings.first_information
     return finish(

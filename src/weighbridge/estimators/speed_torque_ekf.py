@@ -56,7 +56,7 @@ LEVELS: Final = (0.05, 0.05)
 before the drive has shown."""
 
 SLOPE_STD: Final = 0.004
-"""Standard deviation of the slope beside what the grade's says, before the drive has told [-]: with
+"""Standard deviation of the slope beside what the grade's says, before the drive [-]: with
 it gusts and errors of the torque pass for hills, 0.04 m/s^2."""
 
 UNMEASURED_GRADE: Final = 0.02
@@ -173,7 +173,7 @@ class FilterRun:
     running_mass, running_std : (n,) of a pass from the settings' mass [kg]
     x : (n, 4 + k) states of the last pass
     innovation : (n,) of the speed [m/s]; NaN where nothing was predicted
-    taken : (n,) samples that told the mass
+    taken : (n,) samples that updated the mass
     """
 
     time: Floats
@@ -193,7 +193,7 @@ def run_filter(
 ) -> FilterRun:
     """Run the filter over a drive until the mass it is linearised about is the one it finds.
 
-    Levels of noise that the settings leave open are those of highest likelihood.
+    Levels of noise that the settings do not state are those of highest likelihood.
 
     Parameters
     ----------
@@ -392,7 +392,7 @@ def estimate(
     """Weigh by an extended Kalman filter of speed, inverse mass and slope; the torque is its input.
 
     The mass is that of the whole drive. Its standard deviation holds the filter's own, what
-    the calibration left open by its effect on this drive's mass, and what speeds leave.
+    the calibration does not determine by its effect on this drive's mass, and what speeds leave.
 
     Parameters
     ----------

@@ -28,8 +28,8 @@ MARKS = 5
 """Words by which a line is known, at most."""
 
 (KIND, LEAST, BUS, IDENTIFIER, EXTENDED, SIZE, DATA, CODING, SKIP, MOST, MARK) = range(11)
-"""Columns of `FrameForm.shapes`, where from the last on three tell each mark: its place, and its
-first and last row of tags."""
+"""Columns of `FrameForm.shapes`, where from the last on three describe each mark: its place, and
+its first and last row of tags."""
 
 
 class FrameForm(NamedTuple):
@@ -199,7 +199,7 @@ def _frame(text, starts, ends, words, form, shape, rows, row):
     if identifier < 0 or (form.socketcan and digits != 3 and digits != 8):
         return FRAME, -1
     if identifier > 0x1FFFFFFF:
-        # An error of the bus is told under an identifier with this flag.
+        # An error of the bus is reported under an identifier with this flag.
         return NOTHING if form.socketcan and identifier & 0x20000000 else FRAME, -1
     told = shape_of[EXTENDED]
     if told < words:
@@ -310,7 +310,7 @@ def _base64(text, start, end, size, data, row):
 
 @kernel
 def _decoded(code):
-    """Bytes that a code of data length from 9 on stands for (ISO 11898-1)."""
+    """Bytes that a code of data length from 9 on means (ISO 11898-1)."""
     return 12 + 4 * (code - 9) if code <= 12 else 32 + 16 * (code - 13)
 
 
@@ -370,7 +370,7 @@ def _is_gap(letter, form):
 
 @kernel
 def _is_one_of(text, start, end, tags, first, last):
-    """Tell whether a word is one of those tagged."""
+    """Return whether a word is one of those tagged."""
     tag = 0
     for k in range(start, min(end, start + 7)):
         letter = np.int64(text[k])

@@ -22,7 +22,7 @@ class HybridParams(NamedTuple):
     rls : RobustRlsParams
     ekf : MassEkfParams
     first_information : of the least squares, at which the Kalman filter starts
-        from it and a mass is told
+        from it and a mass is reported
     start_mass : that the Kalman filter starts from instead [kg]; 0 for none
     start_std : of the mass the Kalman filter starts from, relative [-]
     blend : `SPEED` to `SHARE`
@@ -50,7 +50,7 @@ class HybridParams(NamedTuple):
 
 
 class Rivals(NamedTuple):
-    """How well both have foretold the windows, each by what it knew before the window.
+    """How well both have predicted the windows, each by what it knew before the window.
 
     Attributes
     ----------
@@ -149,10 +149,10 @@ def share_of_rls(before, speed, rls_var, ekf_var, rivals, params):
 
 @kernel
 def compare(rivals, mean_phi, mean_y, rls_innovation, params):
-    """Fold in how well both foretold a window of the least squares.
+    """Fold in how well both predicted a window of the least squares.
 
     The least-squares weights of two forecasts of one force, as in Bates and Granger, are what
-    the sums give: the share that would have foretold the past best.
+    the sums give: the share that would have predicted the past best.
     """
     innovation = mean_y - (mean_phi - params.ekf.gravity * rivals.offset) * rivals.mass
     apart = innovation - rls_innovation
@@ -218,7 +218,7 @@ def step(state, row, phi, y, params):
     share, mass, var = state.share, state.mass, state.var
     if started:
         ekf_mass, ekf_var = ekf.x[mass_ekf.MASS], ekf.cov[mass_ekf.MASS, mass_ekf.MASS]
-        # A start of the Kalman filter from the least squares says that they have told a mass.
+        # A start of the Kalman filter from the least squares says that they have reported a mass.
         if params.start_mass <= 0.0 or rls.information >= params.first_information:
             rls_var = robust_rls.variance(rls, params.rls)
             share = share_of_rls(share, row.speed, rls_var, ekf_var, rivals, params)

@@ -179,7 +179,7 @@ def make_room(j, count, time, cause, born, loaded, weight, mean, cov):
     drop, kept = at, beside
     if weight[j, at] >= weight[j, beside]:
         drop, kept = beside, at
-    # What the dropped one believed goes to its neighbour: both tell nearly the same.
+    # What the dropped one believed goes to its neighbour: both say nearly the same.
     weight[j, kept] += np.log1p(np.exp(weight[j, drop] - weight[j, kept]))
     for i in range(drop, count - 1):
         cause[j, i] = cause[j, i + 1]
@@ -261,20 +261,20 @@ def impulses(phi, old_step, length, longest):
     -------
     impulse : (3,)
         NaN where it is unknown.
-    doubt : (3,)
+    unsure : (3,)
         What the parabola adds to the chord, which neither knows.
     """
-    impulse, doubt = np.full(AXES, np.nan), np.zeros(AXES)
+    impulse, unsure = np.full(AXES, np.nan), np.zeros(AXES)
     if length > 0.0 and length <= longest:
         for j in range(AXES):
             known_step = old_step if np.isfinite(phi[2, j]) else 0.0
             impulse[j] = integral(phi[2, j], phi[1, j], phi[0, j], known_step, length)
-            doubt[j] = impulse[j] - 0.5 * length * (phi[0, j] + phi[1, j])
-    return impulse, doubt
+            unsure[j] = impulse[j] - 0.5 * length * (phi[0, j] + phi[1, j])
+    return impulse, unsure
 
 
 @kernel
-def predict_all(j, count, cause, mean, cov, impulse, doubt, measured, length, params):
+def predict_all(j, count, cause, mean, cov, impulse, unsure, measured, length, params):
     """Integrate all hypotheses of one axis over a step; over one of unknown impulse, forget.
 
     A velocity forgotten starts from the one ``measured``, where there is one.
@@ -285,7 +285,7 @@ def predict_all(j, count, cause, mean, cov, impulse, doubt, measured, length, pa
                 held = measured if np.isfinite(measured) else mean[j, i, 0]
                 forget_velocity(mean[j, i], cov[j, i], held)
         return
-    push_var = params.push_var[j] * length * length + doubt * doubt
+    push_var = params.push_var[j] * length * length + unsure * unsure
     for i in range(count):
         var = mean[j, i, 1] * mean[j, i, 1] * push_var
         drift = params.push_drift[j] if cause[j, i] == BEGAN else params.beta_drift
@@ -393,7 +393,7 @@ def step(state, time, travel, rate, velocity, params):
     phi = np.empty((3, AXES))
     phi[0] = accelerations(travel, rate, params.spring, params.damper)
     phi[1:] = state.phi
-    impulse, doubt = impulses(phi, state.old_step, length, params.longest)
+    impulse, unsure = impulses(phi, state.old_step, length, params.longest)
     known = np.isfinite(impulse[0])
 
     next_spawn, next_turn = state.next_spawn.copy(), state.next_turn.copy()
@@ -406,7 +406,7 @@ def step(state, time, travel, rate, velocity, params):
     innovation, innovation_var = np.full(AXES, np.nan), np.full(AXES, np.nan)
     for j in range(AXES):
         measured, n = velocity[j], count[j]
-        predict_all(j, n, cause, mean, cov, impulse[j], doubt[j], measured, length, params)
+        predict_all(j, n, cause, mean, cov, impulse[j], unsure[j], measured, length, params)
         if np.isfinite(measured):
             innovation[j], innovation_var[j] = correct_all(
                 weight[j, :n], mean[j, :n], cov[j, :n], measured, params.noise_var[j]

@@ -80,7 +80,7 @@ def propagate(x, force, turn, dt, noise):
     turn : 3 floats
         Angular rate in body axes [rad/s].
     dt : float
-        Time the sample stands for [s].
+        Time the sample covers [s].
     noise : Noise
     """
     fx, fy, fz = force

@@ -85,7 +85,7 @@ def _set_body_row(x, h, slot, start, axis, gravity):
 
     The row's direction is body axis ``axis``, for the constraints less the forward axis times
     the angle at which the vehicle travels in its own axes: mounting, and squat where it pitches.
-    The row stands in ``h[slot, start:]``; its places of the constants are left zero.
+    The row is in ``h[slot, start:]``; its places of the constants are left zero.
     """
     (r00, r01, r02), (r10, r11, r12), (r20, r21, r22) = matrix_rows(
         x[Q], x[Q + 1], x[Q + 2], x[Q + 3]
@@ -215,7 +215,7 @@ def _vehicle_row(x, h, slot, start, kind, measured, noise):
 
 @inlined_fast_kernel
 def _is_lost(x, place, refused, noise):
-    """Count refusals in succession; tell whether there are so many that the filter is lost."""
+    """Count refusals in succession; return whether there are so many that the filter is lost."""
     if not refused:
         x[place] = 0.0
     elif x[place] < noise.patience:

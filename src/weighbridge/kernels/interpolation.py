@@ -191,7 +191,7 @@ def trapezoid_means(edges, time, values):
 
 @kernel
 def seen_windows(edges, time, limit):
-    """Tell which windows have samples throughout.
+    """Return which windows have samples throughout.
 
     Parameters
     ----------

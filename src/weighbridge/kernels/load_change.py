@@ -35,7 +35,7 @@ class LoadState(NamedTuple):
     same : disturbance.DisturbanceState as if nothing had changed at the last stop
     changed : the same with a jump there
     open : whether ``changed`` is still tried
-    prior : logarithm of its odds before any row told
+    prior : logarithm of its odds before any row
     trial_row : row from which it is tried
     rows : rows seen
     """
@@ -107,7 +107,7 @@ def step(state, time, row, y, noise_var, odds, params):
     """
     changed_from = -1
     young = state.open and state.rows - state.trial_row < params.fewest
-    # Where stops come fast, the one at which a change is likeliest is tried until it can tell.
+    # Where stops come fast, the one at which a change is likeliest is tried until it can decide.
     if not np.isnan(odds) and not (young and odds <= state.prior):
         state, changed_from = decided(state, params)
         moved = disturbance.inflated(state.same, params.jump_var)

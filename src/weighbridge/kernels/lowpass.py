@@ -45,7 +45,7 @@ def lowpass_resample(time, values, start, period, first, reach, out, weight):
     weight[:] = 0.0
     nearest = np.zeros(count)
     for i in range(time.size):
-        # each sample stands for the time to its neighbours, so that jitter and
+        # each sample covers the time to its neighbours, so that jitter and
         # bursts do not weigh more
         left = time[i] - time[i - 1] if i > 0 else time[i + 1] - time[i]
         right = time[i + 1] - time[i] if i + 1 < time.size else left

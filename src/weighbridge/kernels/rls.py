@@ -148,7 +148,7 @@ def step(state, time, phi, y, params):
         _fold(theta, cov, phi, innovation, params)
 
     # Rows near each other share their error (wind, grade, torque model). The
-    # sum over a block against its value for independent rows tells how much
+    # sum over a block against its value for independent rows shows how much
     # less they know than their number says.
     block_end, score, expected = state.block_end, state.score, state.expected
     block_score, block_expected = state.block_score, state.block_expected

@@ -16,7 +16,7 @@ class RobustRlsParams(NamedTuple):
     Attributes
     ----------
     window : length of the means that are folded in [s]
-    period : time that one row stands for [s]
+    period : time that one row covers [s]
     pause : rows further apart belong to different windows [s]
     forgetting : weight kept by the past at each window, in (0, 1] [-]
     kept_information : sum of squared regressors below which nothing is forgotten
@@ -27,7 +27,7 @@ class RobustRlsParams(NamedTuple):
     scale_windows : windows over which the innovation variance is averaged [-]
     settle_windows : windows before the threshold holds
     offset_std : standard deviation of the offset over the mass before the drive
-        has told [m/s^2]; 0 for none, as the paper
+        [m/s^2]; 0 for none, as the paper
     offset_forgetting : weight kept by the past of the offset at each window, in
         (0, 1] [-]
     noise_floor : standard deviation over the mass that a window has at least [m/s^2]

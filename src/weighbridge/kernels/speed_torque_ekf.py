@@ -18,7 +18,7 @@ class SpeedTorqueParams(NamedTuple):
     speed_var : R, of one sample of the speed [m^2/s^2]
     accel_density : of the acceleration that the model does not know, white [m^2/s^3]
     gust_speed : speed at which gusts are half of it [m/s]
-    slope_var : of the slope that no grade tells, where it is stationary [-]
+    slope_var : of the slope that no grade shows, where it is stationary [-]
     slope_length : way over which it lasts; infinite for a random walk [m]
     slope_walk : growth of its variance per way [1/m]
     rolling_var : of the error of the rolling coefficient, where it is stationary [-]
@@ -229,7 +229,7 @@ def step(state, row, params):
     innovation_var : float
         Its variance as the filter sees it [m^2/s^2]; NaN there too.
     taken : bool
-        Whether the sample told the mass: False where the forces are unknown, and where the gate
+        Whether the sample updated the mass: False where the forces are unknown, and where the gate
         left it out.
 
     References

@@ -1,4 +1,4 @@
-"""Filter of `disturbance` beside a force that is switched on and off when nobody tells."""
+"""Filter of `disturbance` beside a force that is switched on and off at unknown times."""
 
 from typing import NamedTuple
 
@@ -166,7 +166,7 @@ def _merged(state, time, moved, cov, chance):
 
 @kernel
 def run(state, time, rows, y, noise_var, force, added, params):
-    """Apply ``step`` to each row, and tell of each by all rows whether the force was on.
+    """Apply ``step`` to each row, and find for each by all rows whether the force was on.
 
     Parameters
     ----------

@@ -127,7 +127,7 @@ def _rested(state, time, moving, params):
 
 @kernel
 def run(state, time, usable, moving, values, params):
-    """Sum rows into windows and tell those that are complete.
+    """Sum rows into windows and return those that are complete.
 
     A window is complete as soon as a usable row of another one comes, or a row so late that
     none of it can.

@@ -38,8 +38,8 @@ from weighbridge.papers.du2025_methods import (
 )
 from weighbridge.papers.du2025_panels import panels
 from weighbridge.papers.du2025_results import DriveResult, Opposite, Reproduction, cell
-from weighbridge.papers.du2025_told import CONVERGED as CONVERGED
-from weighbridge.papers.du2025_told import steady_from, told
+from weighbridge.papers.du2025_running import CONVERGED as CONVERGED
+from weighbridge.papers.du2025_running import running_error, steady_from
 from weighbridge.papers.reproduced import Progress, Reproduced, rms
 from weighbridge.pipeline.weighing import weigh
 from weighbridge.report.table import Table
@@ -163,7 +163,9 @@ def _run_as_printed(
         done.printed[code] = {m: rms(error) for m, error in late.items()}
         done.printed_mean[code] = {m: float(np.mean(error)) for m, error in late.items()}
         done.printed_worst[code] = {m: float(np.max(np.abs(e))) / mass for m, e in late.items()}
-        done.printed_told[code] = {m: told(track, made, mass) for m, track in found.items()}
+        done.printed_running[code] = {
+            m: running_error(track, made, mass) for m, track in found.items()
+        }
         if form in FORMS:
             done.printed_tracks[code] = found
         whole = form.of(settings.printed)

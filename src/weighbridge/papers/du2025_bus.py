@@ -66,7 +66,7 @@ def data_sheet() -> Vehicle:
 
 
 def known_bus() -> Vehicle:
-    """Return the bus as the paper's filters know it: nothing about it is in doubt.
+    """Return the bus as the paper's filters know it: all of it is certain.
 
     The losses of the driveline are off in these drives, as the paper knows
     them, so its efficiency is one; the sensor's mounting is known.

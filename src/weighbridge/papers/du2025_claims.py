@@ -12,7 +12,7 @@ import numpy as np
 from weighbridge.papers.du2025_bus import LOADS
 from weighbridge.papers.du2025_methods import BAND, METHODS, PAPER_RMSE, PAPER_TIME
 from weighbridge.papers.du2025_results import DriveResult, Reproduction, cell
-from weighbridge.papers.du2025_told import CONVERGED, Told
+from weighbridge.papers.du2025_running import CONVERGED, RunningError
 from weighbridge.signals import Floats
 
 LEAST, KALMAN, BLEND = METHODS
@@ -54,12 +54,12 @@ class TextClaim:
     seen: str = ""
 
 
-def _told(done: Reproduction, form: str, method: str, load: str = "") -> list[Told]:
-    return [d.printed_told[form][method] for d in done.drives if load in ("", d.load)]
+def _running(done: Reproduction, form: str, method: str, load: str = "") -> list[RunningError]:
+    return [d.printed_running[form][method] for d in done.drives if load in ("", d.load)]
 
 
 def _mean(done: Reproduction, form: str, method: str, name: str, load: str = "") -> float:
-    return float(np.mean([getattr(t, name) for t in _told(done, form, method, load)]))
+    return float(np.mean([getattr(t, name) for t in _running(done, form, method, load)]))
 
 
 def _by_speed(done: Reproduction, form: str, *, name: str, better: str) -> tuple[str, bool]:
@@ -81,7 +81,7 @@ def _moment(done: Reproduction, form: str, method: str, load: str) -> tuple[str,
     """Say when a method came within the band for good, and when at the latest [s]."""
     last = max(float(d.tracks[method].time[-1] - d.tracks[method].time[0])
                for d in done.drives if d.load == load)  # fmt: skip
-    at = np.array([t.steady_at for t in _told(done, form, method, load)])
+    at = np.array([t.steady_at for t in _running(done, form, method, load)])
     if np.max(at) >= last - 1.0:
         return NEVER, float("inf")
     return f"{np.mean(at):.0f} s", float(np.mean(at))

@@ -196,7 +196,7 @@ def _kalman() -> dict[str, Found]:
     start = start._replace(x=x.copy(), cov=cov.copy())
     row = _row(STEP, rotating=rotating)
     ahead = mass_ekf.step(start, row, blind)[0]
-    told = mass_ekf.step(start, row, params)[0]
+    updated = mass_ekf.step(start, row, params)[0]
     force = TORQUE * GEAR * AXLE * EFFICIENCY / (MASS * RADIUS)
     level = force - GRAVITY * COEFFICIENT - DRAG / MASS
     printed = (level - GRAVITY * GRADE) / delta
@@ -240,9 +240,9 @@ def _kalman() -> dict[str, Found]:
         "eq 28 mass": _near(rates[2], by_mass, "m/s² per kg", held + 0.01),
         "eq 29": same(before, ahead.x[:3]),
         "eq 30": same(predicted / scale, ahead.cov[:3, :3] / scale),
-        "eq 31": same(gain @ innovation, told.x[:3] - before),
-        "eq 32": same(after, told.x[:3]),
-        "eq 33": same(left / scale, told.cov[:3, :3] / scale),
+        "eq 31": same(gain @ innovation, updated.x[:3] - before),
+        "eq 32": same(after, updated.x[:3]),
+        "eq 33": same(left / scale, updated.cov[:3, :3] / scale),
     }  # fmt: skip
 
 

@@ -64,7 +64,7 @@ typically the identity, Huber's c and the information at which the first mass is
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Form:
-    """One reading of what the paper leaves open: rows, rolling coefficient, threshold, blend.
+    """One reading of what the paper does not state: rows, rolling coefficient, threshold, blend.
 
     Attributes
     ----------
@@ -153,7 +153,7 @@ class Settings:
     as_printed : take ``printed`` in place of ``ours``, rows with a reason against them left out
         where ``printed.ekf.start.every_row`` is false
     count_grade_twice : in the regressor, as eq. 14 is printed
-    rolling_coefficient : that the filters are told in place of the vehicle's [-]
+    rolling_coefficient : that the filters use in place of the vehicle's [-]
     payloads : of the judged drives, without, at half and at full load [kg]
     blend : of the hybrid, short for ``ours.blend``; not when ``as_printed``
     """

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from weighbridge.estimators import MassTrack
-from weighbridge.papers.du2025_told import Told
+from weighbridge.papers.du2025_running import RunningError
 from weighbridge.signals import Floats
 from weighbridge.vehicle.model import Vehicle
 
@@ -40,19 +40,19 @@ class DriveResult:
     seed : of the drive
     true_mass : mean over the drive [kg]
     tracks : of each method
-    rmse : of the running mass from the first one told [kg]
+    rmse : of the running mass from the first one reported [kg]
     late_rmse : the same from `CONVERGED` [kg]
     worst : largest relative error of the running mass from `CONVERGED` [-]
     held : part of the instants from `CONVERGED` whose 95 % interval holds the truth [-]
     seconds : processor time of each method, forces and motion given [s]
     steady_at : time since the start from when on the running mass stays within `BAND` [s]
-    twice_rmse : of robust-rls with the grade counted twice, from the first mass told [kg]
+    twice_rmse : of robust-rls with the grade counted twice, from the first mass reported [kg]
     blends : ``late_rmse`` of the hybrid by its blend
     printed : ``late_rmse`` of each method as printed, by the code of a `Form`; empty where the
         bus is not known
     printed_mean : mean error of the running mass of the same [kg]
     printed_worst : largest relative error of the running mass of the same from `CONVERGED` [-]
-    printed_told : what the running mass of the same does, method by method
+    printed_running : what the running mass of the same does, method by method
     printed_tracks : their tracks with f = 0.005, by the code of the form
     unit_start : ``printed`` of the Kalman filter with a first variance of the mass of 1 kg²,
         P0 = I [kg]
@@ -74,7 +74,7 @@ class DriveResult:
     printed: dict[str, dict[str, float]] = field(default_factory=dict)
     printed_mean: dict[str, dict[str, float]] = field(default_factory=dict)
     printed_worst: dict[str, dict[str, float]] = field(default_factory=dict)
-    printed_told: dict[str, dict[str, Told]] = field(default_factory=dict)
+    printed_running: dict[str, dict[str, RunningError]] = field(default_factory=dict)
     printed_tracks: dict[str, dict[str, MassTrack]] = field(default_factory=dict)
     unit_start: dict[str, float] = field(default_factory=dict)
     opposite: Opposite | None = None

@@ -103,7 +103,7 @@ class Settings:
     sampling: SpeedSampling = field(default_factory=SpeedSampling)
 
     def fitted(self, known: SimulatedDrive, mass: float | None = None) -> SpeedCalibration:
-        """Fit the model to a drive of known grade, told its mass or another [kg]."""
+        """Fit the model to a drive of known grade, with its mass or another [kg]."""
         return calibrate_by_speed(
             [with_grade(known)],
             [mass_of(known) if mass is None else mass],
@@ -123,7 +123,7 @@ STARTS: Final = (800.0, 1092.0, 1500.0, 2000.0)
 """Masses the filter is started from, to see where it ends [kg]."""
 
 STATED: Final = (900.0, 1092.0, 1400.0)
-"""Masses the calibration is told of one and the same drive [kg]."""
+"""Masses stated to the calibration of one and the same drive [kg]."""
 
 PAYLOADS: Final = (0.0, 100.0, 200.0, 300.0, 400.0)
 """Loads that the paper did not try [kg]."""

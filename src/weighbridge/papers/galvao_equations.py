@@ -145,14 +145,14 @@ def _corrections() -> dict[str, Found]:
     ]  # fmt: skip
     nominal = Nominal(force_gain=A1, drag=A2, rolling_coefficient=ROLLING, rotating_mass=ROTATING)
     fit = fit_speed_model(pairs, nominal, STEP)
-    told = [model_speed(p, _speed_model(fit.corrections))[1] for p in pairs[:40]]
+    stepped = [model_speed(p, _speed_model(fit.corrections))[1] for p in pairs[:40]]
     return {
         "eq 15": same(a[0] * torque, float(kernel.traction_force(before, params)), "N"),
         "eq 16": same(0.5 * PHI1 * a[1] * SPEED**2, inertia * float(without - accel), "m/s²"),
         "eq 17": same(
             a[2] * PHI2, PHI1 * a[0] * torque - inertia * float(without), "m/s²"
         ),
-        "eq 18": same(np.array(after[:40]), np.array(told), "m/s"),
+        "eq 18": same(np.array(after[:40]), np.array(stepped), "m/s"),
     }  # fmt: skip
 
 

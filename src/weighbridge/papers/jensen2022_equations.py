@@ -145,11 +145,11 @@ def _earth() -> dict[str, Found]:
     found = pymap3d.geodetic2ned(*there, *here, deg=False)
     flat = float(np.hypot(ours[0], ours[1]))
     normal = SEMI_MAJOR / math.sqrt(1.0 - square * math.sin(there[0]) ** 2)
-    told = printed(*there)
+    as_printed = printed(*there)
     return {
-        "eq 12": same(told[0], ours[0], "m"),
-        "eq 13": same(told[1], ours[1], "m"),
-        "eq 14": same(told[2], ours[2], "m"),
+        "eq 12": same(as_printed[0], ours[0], "m"),
+        "eq 13": same(as_printed[1], ours[1], "m"),
+        "eq 14": same(as_printed[2], ours[2], "m"),
         "eq 15": same(normal, flat / math.cos(there[0]) - 55.0, "m"),
         "eq 16": _close(ned, np.array(found), 1e-6, "m"),
     }
@@ -180,7 +180,7 @@ STEP: Final = 0.005
 FORCE: Final = np.array([0.9, -0.3, -9.6])
 RATE: Final = np.array([0.02, -0.05, 0.3])
 FIX: Final = np.array([3.0, -2.0, 0.5])
-TOLD: Final = 12.4
+MEASURED: Final = 12.4
 """One sample of the filter: its length [s], inertial values, fix [m] and vehicle speed [m/s]."""
 
 ANGLES: Final = (0.02, 0.05, 0.4)
@@ -211,8 +211,8 @@ def _run(*, samples: int = 2, aided: bool = False, attitude: bool = False) -> _N
     x, cov, _ = _start()
     speed, fix = np.full(samples, np.nan), np.full(samples, -1, dtype=np.int64)
     if aided:
-        speed[-1], fix[-1] = TOLD, 0
-    # Until a speed is told the vehicle stands, and this noise of the constraints holds.
+        speed[-1], fix[-1] = MEASURED, 0
+    # Until a speed is measured the vehicle stands, and this noise of the constraints holds.
     noise = PrintedFilterSettings(attitude_term=attitude).noise._replace(still_std=1e12)
     shown = np.empty((samples, ins_printed.SHOWN))
     ins_printed.run(
@@ -293,7 +293,7 @@ def _updated(x: Floats, cov: Floats, *, attitude: bool) -> tuple[Floats, Floats]
         measure[3:6, 6:9] = -rot.T @ _skew(x[3:6])
     spread = np.diag(np.square([2.0, 2.0, 5.0, 0.5, 5.0, 15.0]))
     gain = cov @ measure.T @ np.linalg.inv(measure @ cov @ measure.T + spread)
-    off = np.concatenate([FIX - x[0:3], np.array([TOLD, 0.0, 0.0]) - rot.T @ x[3:6]])
+    off = np.concatenate([FIX - x[0:3], np.array([MEASURED, 0.0, 0.0]) - rot.T @ x[3:6]])
     return gain @ off, (np.eye(15) - gain @ measure) @ cov
 
 
@@ -339,8 +339,8 @@ def _update() -> dict[str, Found]:
     made = _predicted(x, _run(samples=1).cov)
     error, left = _updated(made.x, made.cov, attitude=False)
     own, own_left = _updated(made.x, made.cov, attitude=True)
-    told, ours = _run(aided=True), _run(aided=True, attitude=True)
-    moved = told.x - made.x
+    updated, ours = _run(aided=True), _run(aided=True, attitude=True)
+    moved = updated.x - made.x
     turned = (np.eye(3) - _skew(error[6:9])) @ _by_26(made.x[6:10])
     scale = np.sqrt(np.outer(np.diag(left), np.diag(left)))
     corrected = made.x[0:6] + error[0:6]
@@ -350,19 +350,19 @@ def _update() -> dict[str, Found]:
         "eq 38": same(error[0:3], moved[0:3], "m"),
         "eq 39": same(error[3:6], moved[3:6], "m/s"),
         "eq 40": same(error[12:15], moved[13:16], "rad/s"),
-        "eq 41": same(corrected[0:3], told.x[0:3], "m"),
-        "eq 42": same(corrected[3:6], told.x[3:6], "m/s"),
+        "eq 41": same(corrected[0:3], updated.x[0:3], "m"),
+        "eq 42": same(corrected[3:6], updated.x[3:6], "m/s"),
         # A sequence of small angles and a rotation vector are the same to first order.
-        "eq 43": _close(np.roll(_by_43(turned), 1), told.x[6:10], 1e-5),
-        "eq 44": same(left / scale, told.cov / scale),
-        "eq 45": same(corrected, told.x[0:6]),
+        "eq 43": _close(np.roll(_by_43(turned), 1), updated.x[6:10], 1e-5),
+        "eq 44": same(left / scale, updated.cov / scale),
+        "eq 45": same(corrected, updated.x[0:6]),
         "eq 46": same(error[0:6], moved[0:6]),
         "eq 46 ours": same(error[0:6], (ours.x - made.x)[0:6]),
         "eq 46 attitude": same(
             np.concatenate([own[0:6], (own_left / scale).ravel()]),
             np.concatenate([(ours.x - made.x)[0:6], (ours.cov / scale).ravel()]),
         ),
-        "eq 47": same(np.diag(left) / np.diag(told.cov), np.ones(15)),
+        "eq 47": same(np.diag(left) / np.diag(updated.cov), np.ones(15)),
     }
 
 

@@ -53,7 +53,7 @@ LOADED: Final = (4, 5, 6, 7, 8)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Settings:
-    """Everything the paper varies, and what its text leaves open.
+    """Everything the paper varies, and what its text does not state.
 
     Attributes
     ----------

@@ -117,15 +117,15 @@ def _stepped(method: Method, *, measured: bool) -> tuple[kalman_bucy.KalmanBucyS
     )
     pushed = -(params.spring @ travel + params.damper @ rate)
     begun = start._replace(time=0.0, phi=np.vstack([pushed, pushed]))
-    told = speed + np.array([1e-3, -2e-3, 1e-3]) if measured else np.full(3, np.nan)
-    return kalman_bucy.step(begun, STEP, travel, rate, told, params), pushed
+    reading = speed + np.array([1e-3, -2e-3, 1e-3]) if measured else np.full(3, np.nan)
+    return kalman_bucy.step(begun, STEP, travel, rate, reading, params), pushed
 
 
 def _filter() -> dict[str, Found]:
     """Return eqs. 7 to 9."""
     speed = np.array([0.02, -0.01, 0.03])
     free, pushed = _stepped("printed", measured=False)
-    told, _ = _stepped("printed", measured=True)
+    updated, _ = _stepped("printed", measured=True)
     moving, _ = _stepped("extended", measured=True)
     settings = Settings()
     scale = np.array([MASS, ROLL, PITCH])
@@ -143,7 +143,9 @@ def _filter() -> dict[str, Found]:
     return {
         "eq 7": same(ahead, free.mean),
         "eq 8": same(np.diag(grown), free.cov),
-        "eq 9": same(np.concatenate([after, left]), np.concatenate([told.mean, np.diag(told.cov)])),
+        "eq 9": same(
+            np.concatenate([after, left]), np.concatenate([updated.mean, np.diag(updated.cov)])
+        ),
         "eq 9 ours": same(after[3:], moving.mean[3:]),
     }
 

@@ -31,15 +31,15 @@ SLOW: Final = scalar_to_si(40.0, "kmh")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Told:
+class RunningError:
     """What one running mass did; errors are relative to the true mass.
 
     Attributes
     ----------
-    first : error of the first mass told [-]
+    first : error of the first mass reported [-]
     steady_at : time since the start from when on it stays within `BAND` of the true one [s]
     swing : farthest that it moves within `AFTER` of a braking in the cruise [-]
-    slow, fast : RMS error below and above `SLOW`, from the first mass told [kg]
+    slow, fast : RMS error below and above `SLOW`, from the first mass reported [kg]
     early, late : mean absolute error in the first and in the last `LATER` after `CONVERGED` [kg]
     wander : its standard deviation from `CONVERGED` on [kg]
     """
@@ -54,7 +54,7 @@ class Told:
     wander: float
 
 
-def told(track: MassTrack, made: SimulatedDrive, mass: float) -> Told:
+def running_error(track: MassTrack, made: SimulatedDrive, mass: float) -> RunningError:
     """Look at a running mass of a drive.
 
     Parameters
@@ -70,7 +70,7 @@ def told(track: MassTrack, made: SimulatedDrive, mass: float) -> Told:
     def mean(rows: Bools) -> float:
         return float(np.mean(error[rows]))
 
-    return Told(
+    return RunningError(
         first=float(error[np.argmax(known)] / mass),
         steady_at=steady_from(track, mass, made.drive.start),
         swing=swing(track, made),
