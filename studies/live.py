@@ -43,8 +43,8 @@ MINUTES = (5.0, 10.0, 20.0)
 
 
 @dataclass(frozen=True)
-class Told:
-    """What a scale told at one moment: mass, std and truth [kg], and its status."""
+class Shown:
+    """What a scale shows at one moment: mass, std and truth [kg], and its status."""
 
     mass: float
     std: float
@@ -62,7 +62,7 @@ class Told:
 
 @dataclass(frozen=True)
 class Run:
-    """One drive: what was told after some minutes on the move, at the end, and by the batch.
+    """One drive: what was shown after some minutes on the move, at the end, and by the batch.
 
     ``running`` is the mass just before the scale looks at all records once more, at the end, and
     ``first`` the first mass that is shown, after ``wait`` on the move [s].
@@ -70,10 +70,10 @@ class Run:
 
     name: str
     wait: float
-    first: Told | None
-    after: dict[float, Told]
-    running: Told
-    end: Told
+    first: Shown | None
+    after: dict[float, Shown]
+    running: Shown
+    end: Shown
     batch: float
     withdrawn: int
 
@@ -85,12 +85,12 @@ def run(name: str, folder: Path, car: wb.Vehicle) -> Run:
     time, mass = truth["time_s"].to_numpy(), truth["mass_kg"].to_numpy()
     scale = wb.LiveScale(car, info=drive.info, step=LONGEST_STEP)
 
-    def told() -> Told:
+    def shown() -> Shown:
         now = scale.weighing()
         at = now.time if math.isfinite(now.time) else scale.newest
-        return Told(now.mass, now.std, float(np.interp(at, time, mass)), str(now.status))
+        return Shown(now.mass, now.std, float(np.interp(at, time, mass)), str(now.status))
 
-    after: dict[float, Told] = {}
+    after: dict[float, Shown] = {}
     first, wait = None, math.inf
     withdrawn = 0
     edges = drive.start + np.arange(0.0, drive.duration + 2.0 * FASTEST_BLOCK, FASTEST_BLOCK)
@@ -100,11 +100,11 @@ def run(name: str, folder: Path, car: wb.Vehicle) -> Run:
         now = scale.weighing()
         withdrawn += now.status is LiveStatus.INCONSISTENT
         if first is None and math.isfinite(now.mass):
-            first, wait = told(), now.driven
+            first, wait = shown(), now.driven
         for minutes in MINUTES:
             if minutes not in after and now.driven >= 60.0 * minutes:
-                after[minutes] = told()
-    running = told()
+                after[minutes] = shown()
+    running = shown()
     scale.finish()
     try:
         batch = wb.weigh(drive, car)
@@ -113,7 +113,7 @@ def run(name: str, folder: Path, car: wb.Vehicle) -> Run:
     except WeighbridgeError as error:
         print(f"{name}: {error}", file=sys.stderr)
         found = math.nan
-    return Run(name, wait, first, after, running, told(), found, withdrawn)
+    return Run(name, wait, first, after, running, shown(), found, withdrawn)
 
 
 def calibrated(root: Path, base: wb.Vehicle | None) -> wb.Vehicle:
@@ -164,7 +164,7 @@ def moments(runs: list[Run]) -> list[str]:
         "| median half width % |",
         "|---|---|---|---|---|---|---|---|",
     ]
-    for title, all_told in [
+    for title, all_shown in [
         ("the first mass", [r.first for r in runs if r.first is not None]),
         *(
             (f"{m:.0f} min on the move", [r.after[m] for r in runs if m in r.after])
@@ -173,11 +173,11 @@ def moments(runs: list[Run]) -> list[str]:
         ("the end, before the last look", [r.running for r in runs]),
         ("the end", [r.end for r in runs]),
     ]:
-        found = [t for t in all_told if math.isfinite(t.mass)]
+        found = [t for t in all_shown if math.isfinite(t.mass)]
         errors = np.array([t.error for t in found])
         widths = [196.0 * t.std / t.mass for t in found]
         lines.append(
-            f"| {title} | {len(all_told)} | {len(found)} "
+            f"| {title} | {len(all_shown)} | {len(found)} "
             f"| {sum(t.status == 'weighed' for t in found)} "
             f"| {np.sqrt(np.mean(errors**2)):.2f} | {errors[np.argmax(np.abs(errors))]:+.1f} "
             f"| {share([t.holds for t in found])} | {np.median(widths):.1f} |"

@@ -606,6 +606,27 @@ def test_sensor_that_froze_on_the_way(sane):
     assert any(p.id == "frozen.imu_all" for p in found)
 
 
+@pytest.mark.parametrize(
+    ("level", "until", "expected"),
+    [(0.5, 1500, "frozen.imu"), (1.0, 1500, "imu.gyro_clipped"), (1.0, None, "imu.gyro_clipped")],
+)
+def test_a_gyro_that_repeats_a_value_is_at_its_limit_only_where_that_is_the_highest(
+    sane, level, until, expected
+):
+    s = sane.signals["gyro_z"]
+    values = s.values.copy()
+    held = level * float(np.abs(values).max())
+    values[1000:until] = held
+    if until:
+        values[3000:3500] = held
+    (note,) = [
+        p for p in check_drive(sane.with_signals(replace(s, values=values))) if p.signal == "gyro_z"
+    ]
+    assert note.id == expected
+    # What is left is too little to show how the sensor sits.
+    assert note.serious == (until is None)
+
+
 def test_an_hour_of_standstill_is_a_note():
     t = np.arange(0.0, 3600.0, 0.5)
     rng = np.random.default_rng(0)

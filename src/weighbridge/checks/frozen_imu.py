@@ -50,20 +50,20 @@ def _reported(names: list[str], axis: Signal, speed: Signal | None) -> Problem:
     total = float(lengths.sum())
     k = int(np.argmax(lengths))
     left = axis.duration - total
+    too_little = left < min(_LEAST, 0.5 * axis.duration)
     repeated = np.abs(axis.values[axis.time.searchsorted(stretches[:, 0])])
-    limit = float(repeated[0])
-    again = lengths.size > 1 or limit == float(np.abs(axis.values).max())
-    if again and axis.name in IMU_SIGNALS[3:] and limit and (repeated == limit).all():
+    limit = float(np.abs(axis.values).max())
+    if axis.name in IMU_SIGNALS[3:] and (repeated == limit).all():
         return Problem.of(
             "imu.gyro_clipped",
             axis.name,
             start=stretches[0, 0],
             end=stretches[-1, 1],
+            serious=too_little,
             limit=limit,
             count=lengths.size,
             total=total,
         )
-    too_little = left < min(_LEAST, 0.5 * axis.duration)
     whole = set(names) == set(IMU_SIGNALS)
     return Problem.of(
         "frozen.imu_all" if too_little else "frozen.imu",

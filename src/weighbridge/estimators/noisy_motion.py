@@ -37,8 +37,8 @@ highest at that engine speed the noise of thirteen recordings of three trucks, a
 the information, is the same within 0.01."""
 
 UNANSWERED_STD: Final = 0.2
-"""Standard deviation of the noise that no driver answers, over it [-]: anything between a half
-and all."""
+"""Standard deviation of the noise that no driver answers, over it [-]: five drives of another
+simulator's truck by data sheet come out 3.7 % heavy in the mean, which is a sixth of that noise."""
 
 
 class MotionNoise(NamedTuple):
@@ -116,8 +116,8 @@ def _changes(balance: ForceBalance, vehicle: Vehicle, cut: Windows) -> Floats:
     # As if no fuel were burnt: the mass is then one all along.
     force = np.nan_to_num(force + phi * table.fuel_burnt)
     rows = np.array([cut.mean(phi), cut.mean(force), gained])
-    told = (lasted > SHORTEST) & np.isfinite(rows).all(axis=0)
-    beside = told[1:] & told[:-1] & (np.diff(cut.mean(table.time)) < APART)
+    known = (lasted > SHORTEST) & np.isfinite(rows).all(axis=0)
+    beside = known[1:] & known[:-1] & (np.diff(cut.mean(table.time)) < APART)
     return np.asarray(np.diff(rows, axis=1)[:, beside])
 
 

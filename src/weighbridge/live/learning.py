@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, replace
 from typing import Final
 
-from weighbridge.errors import WeighbridgeError
+from weighbridge.errors import DriveError, WeighbridgeError
 from weighbridge.estimators import Status
 from weighbridge.messages import Problem
 from weighbridge.pipeline import forward
@@ -150,7 +150,7 @@ def _set_up(
     """
     try:
         setup = forward.identify_forward(weighing, step)
-    except WeighbridgeError:
+    except DriveError:
         return None, None
     return setup, forward.resume(weighing, drive, until, setup)
 

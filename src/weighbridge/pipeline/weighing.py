@@ -236,7 +236,8 @@ def _by_noise(found: Weighing) -> bool:
     """Whether a mass is lacking or wide, perhaps by noise of the inertial sensor."""
     if found.status is Status.CONVERGED:
         return found.std > NOISY_STD * found.mass
-    return found.reason_id in NOISY
+    result = found.result
+    return found.reason_id in NOISY and result is not None and math.isfinite(result.mass)
 
 
 def _weigh_all(drive: Drive, vehicle: Vehicle, method: str, settings: Any) -> Weighing:

@@ -241,7 +241,7 @@ def _ask(
     stood = stood_before(table, time)
 
     def of(mass: float | None) -> _Asked:
-        """Squat and levels of noise are told in terms of a mass [kg]."""
+        """Squat and levels of noise are relative to a mass [kg]."""
         body = residual_squat(balance, vehicle, mass or rough)
         squat_accel = body.squat_accel(table.specific_force)
         rows, y = design(
@@ -407,7 +407,7 @@ def _attenuating(
         float(solved.x[-1, 0]),
         float(solved.var[-1, 0]),
     )
-    # Drives of a calibration are as low, so that it is told by how much all are.
+    # The drives of a calibration are as low, so that its scale contains how low all are.
     return found, UNANSWERED_STD if by_data_sheet(vehicle) else 0.0
 
 
