@@ -27,7 +27,7 @@ from weighbridge.signals import Drive
 from weighbridge.vehicle.known import Known, describe
 
 HERE: Final = Path(__file__).parent
-TRUCKS: Final = [(kind, seed) for seed in range(7601, 7605) for kind in ("truck", "semi")]
+TRUCKS: Final = [(kind, seed) for seed in range(7721, 7725) for kind in ("truck", "semi")]
 KNOWN: Final = (0.2, 0.9, 0.5)
 WEIGHED: Final = (0.05, 0.35, 0.7, 0.95)
 """Payloads over the largest [-]."""

@@ -368,10 +368,7 @@ def _heights() -> Iterator[Pair]:
         ("second semi", ("ordinary", "motorway")),
     ):
         for name in names:
-            yield Pair(
-                f"{of}/{name}/by data sheet", "data sheet: no IMU (truck)", of, "",
-                partial(_by_papers, drive=name, equipment="no IMU"), sound=True,
-            )  # fmt: skip
+            yield from _papers(of, name, "data sheet: no IMU")
             for white, wander in ((0.4, 0.0), (0.0, 1.0), (0.4, 2.2)):
                 for papers in (False, True):
                     way = "by data sheet" if papers else "calibrated"
@@ -382,10 +379,15 @@ def _heights() -> Iterator[Pair]:
                         sound=True,
                     )  # fmt: skip
     for k in range(5):
+        yield from _papers("foreign truck", f"drive{k}", "foreign: by data sheet")
+
+
+def _papers(of: str, name: str, slice_: str) -> Iterator[Pair]:
+    """A truck by data sheet alone, without an inertial sensor."""
+    for rate in ("", ", OBD 1 Hz"):
         yield Pair(
-            f"foreign truck/drive{k}/by data sheet", "foreign: by data sheet (truck)",
-            "foreign truck", "", partial(_by_papers, drive=f"drive{k}", equipment="no IMU"),
-            sound=True,
+            f"{of}/{name}/by data sheet{rate}", f"{slice_}{rate} (truck)", of, "",
+            partial(_by_papers, drive=name, equipment=f"no IMU{rate}"), sound=True,
         )  # fmt: skip
 
 

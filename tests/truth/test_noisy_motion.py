@@ -4,7 +4,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from weighbridge.estimators.noisy_motion import attenuation, left_open, unmeasured_noise
+from weighbridge.estimators.noisy_motion import (
+    attenuation,
+    between_samples,
+    left_open,
+    unmeasured_noise,
+)
 from weighbridge.kernels import disturbance as kernel
 
 MASS = 1500.0
@@ -75,3 +80,20 @@ def test_where_most_is_noise_the_mass_is_left_open():
     most = attenuation(np.ones(1), np.full(1, 0.7), np.ones(1), np.zeros(1, dtype=bool))[0]
     assert left_open(most, 0.1) == 1.0
     assert left_open(0.9 * most, 0.1) == pytest.approx(0.09 * most)
+
+
+def test_samples_stand_for_a_random_walk_as_well_as_is_reckoned():
+    rng = np.random.default_rng(3)
+    fine, count = 50, 4000
+    walk = np.cumsum(rng.normal(0.0, 100.0, fine * count + 1))
+    time, force = np.arange(count + 1.0), walk[::fine]
+    line = 0.5 * (force[1:] + force[:-1])
+    mean = (0.5 * (walk[1:] + walk[:-1])).reshape(count, fine).mean(axis=1)
+    usable = np.ones(count + 1, dtype=bool)
+    assert between_samples(time, force, usable) == pytest.approx(np.var(mean - line), rel=0.06)
+    # What was left out between two samples is no change from one to the next.
+    force[1000:] += 1e6
+    usable[1000] = False
+    assert between_samples(time, force, usable) == pytest.approx(np.var(mean - line), rel=0.06)
+    usable[:] = False
+    assert between_samples(time, force, usable) == 0.0

@@ -161,6 +161,31 @@ def unmeasured_noise(
     return np.asarray(part / (1.0 + mass_var * float(np.sum(weight * part))))
 
 
+def between_samples(time: Floats, force: Floats, usable: Bools) -> float:
+    """Variance of the mean force from one sample to the next, over their straight line [N^2].
+
+    A force that walks at random by ``d`` from sample to sample has a mean between both with the
+    variance ``d^2 / 12`` about that of the straight line (Brownian bridge). Samples that shifts,
+    brakes or gaps part are left out.
+
+    Parameters
+    ----------
+    time : (n,) [s]
+    force : (n,) [N]
+    usable : (n,)
+
+    References
+    ----------
+    Brownian bridge: Karatzas and Shreve, Brownian Motion and Stochastic Calculus, 1991, ch. 5.6.
+    """
+    step, change = np.diff(time), np.diff(np.nan_to_num(force))
+    beside = usable[1:] & usable[:-1]
+    if not beside.any():
+        return 0.0
+    beside &= step < 2.0 * np.median(step[beside])
+    return float(np.mean(change[beside] ** 2)) / 12.0
+
+
 def short_of_power(torque: Floats) -> Bools:
     """Windows with so much torque that no more can answer a hill (m,).
 

@@ -56,6 +56,7 @@ from weighbridge.estimators.noisy_motion import (
     UNANSWERED_STD,
     MotionNoise,
     attenuation,
+    between_samples,
     learnt_noise,
     left_open,
     short_of_power,
@@ -401,7 +402,8 @@ def _attenuating(
     found = unmeasured_noise(
         np.where(solved.taken, solved.weight, 0.0),
         solved.noise,
-        min(solved.fast, 1.0) ** 2 * cut.mean(table.force_std**2) / cut.count,
+        min(solved.fast, 1.0) ** 2 * cut.mean(table.force_std**2) / cut.count
+        + between_samples(table.time, table.traction_force, table.usable) / cut.count,
         short_of_power(cut.mean(np.nan_to_num(table.torque))),
         GRAVITY * np.interp(cut.mean(table.time), motion.time, motion.grade_std),
         float(solved.x[-1, 0]),
