@@ -3,10 +3,11 @@
     python studies/truck_fleet.py
 
 Four trucks and four semi-trailers of the second model log speed, engine speed, torque in percent,
-gear, retarder and brake, and a position with its height at 1 Hz: at 5 Hz, at 1 Hz, and at 5 Hz with
-an inertial sensor of 50 Hz. Each is calibrated on three drives of half an hour with known masses,
-and weighed on four others, once by that file and once by data sheet. It fills
-``truck_fleet.template.md``. The seeds are used nowhere else, and nothing was tuned on them.
+gear, retarder and brake, and a position with its height at 1 Hz: at 5 Hz, at 5 Hz with true
+heights, at 1 Hz, and at 5 Hz with an inertial sensor of 50 Hz. Each is calibrated on three drives
+of half an hour with known masses, and weighed on four others, once by that file and once by data
+sheet. It fills ``truck_fleet.template.md``. The seeds are used nowhere else, and nothing was tuned
+on them.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from second_model import Logger, Vehicle, make_drive, random_vehicle
 
 import weighbridge as wb
 from weighbridge.errors import WeighbridgeError
-from weighbridge.signals import Drive
+from weighbridge.signals import Drive, Signal
 from weighbridge.vehicle.known import Known, describe
 
 HERE: Final = Path(__file__).parent
@@ -38,8 +39,11 @@ LOGGER: Final = Logger(
 )  # fmt: skip
 SLOW: Final = replace(LOGGER, rate=1.0)
 
+SURVEYED: Final = "5 Hz, heights of a survey"
+
 RECORDED: Final = {
     "5 Hz": (LOGGER, False),
+    SURVEYED: (LOGGER, False),
     "1 Hz": (SLOW, False),
     "5 Hz, inertial sensor of 50 Hz": (LOGGER, True),
 }
@@ -87,16 +91,22 @@ def drive(
     logger: Logger = LOGGER,
     *,
     with_imu: bool = False,
+    surveyed: bool = False,
 ) -> tuple[Drive, float]:
-    """One drive, and its mass [kg]."""
+    """One drive, and its mass [kg]; with the true heights in place of the receiver's."""
     mass = truck.tare + load * (truck.gross - truck.tare)
     folder = home / str(seed)
-    make_drive(folder, truck, mass=mass, seed=seed, style="ordinary", logger=logger)
+    truth = make_drive(folder, truck, mass=mass, seed=seed, style="ordinary", logger=logger)
     (folder / "drive.toml").unlink()
     if not with_imu:
         (folder / "imu.parquet").unlink()
     beside = ("gnss_speed", "gnss_course", "hdop", "gnss_accuracy")
-    return wb.read_drive(folder).without(*beside), mass
+    read = wb.read_drive(folder).without(*beside)
+    if surveyed:
+        fixes = read.signals["altitude"].time
+        ground = np.interp(fixes, truth["time_s"].to_numpy(), truth["altitude_m"].to_numpy())
+        read = read.with_signals(Signal("altitude", fixes, ground))
+    return read, mass
 
 
 def weighed(kind: str, seed: int, recorded: str) -> tuple[Results, Results]:
@@ -110,7 +120,15 @@ def weighed(kind: str, seed: int, recorded: str) -> tuple[Results, Results]:
         home = Path(folder)
 
         def made(k: int, load: float) -> tuple[Drive, float]:
-            return drive(truck, 100 * seed + k, load, home, logger, with_imu=with_imu)
+            return drive(
+                truck,
+                100 * seed + k,
+                load,
+                home,
+                logger,
+                with_imu=with_imu,
+                surveyed=recorded == SURVEYED,
+            )
 
         known = [made(k, load) for k, load in enumerate(KNOWN)]
         try:

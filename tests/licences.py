@@ -17,6 +17,7 @@ READ = {
     "numba": "BSD-2-Clause",
     "pymap3d": "BSD-2-Clause",
     "pymatreader": "BSD-2-Clause",
+    "rasterio": "BSD-3-Clause",
     "s3fs": "BSD-3-Clause",
     "scipy": "BSD-3-Clause",
 }

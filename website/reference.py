@@ -17,8 +17,8 @@ GROUPS = {
     ),
     "Vehicle": ("Vehicle",),
     "Drives": (
-        "read_drive", "read_drives", "read_frame", "to_frames", "Drive", "DriveInfo", "Signal",
-        "Problem",
+        "read_drive", "read_drives", "read_frame", "to_frames", "with_elevation", "Drive",
+        "DriveInfo", "Signal", "Problem",
     ),
     "Live": ("LiveScale", "LiveWeighing", "LiveStatus"),
     "Inertia from the ride": ("estimate_inertia", "Inertia", "InertiaFilter", "InertiaSettings"),

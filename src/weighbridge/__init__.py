@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from weighbridge.inertia.filter import InertiaFilter
     from weighbridge.inertia.settings import InertiaSettings
     from weighbridge.io import read_drive, read_drives, read_frame, to_frames
+    from weighbridge.io.elevation import with_elevation
     from weighbridge.live.scale import LiveScale
     from weighbridge.live.weighing import LiveStatus, LiveWeighing
     from weighbridge.pipeline.inertia import Inertia, estimate_inertia
@@ -68,6 +69,7 @@ _HOMES = {
     "to_frames": "weighbridge.io",
     "WeighingRow": "weighbridge.results.row",
     "weigh": "weighbridge.pipeline.weighing",
+    "with_elevation": "weighbridge.io.elevation",
 }
 
 __all__ = [
@@ -105,6 +107,7 @@ __all__ = [
     "read_frame",
     "to_frames",
     "weigh",
+    "with_elevation",
 ]
 
 

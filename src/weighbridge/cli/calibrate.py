@@ -13,6 +13,7 @@ from weighbridge.cli.listed import method_names, source_names
 from weighbridge.cli.options import (
     DbcPaths,
     DrivePaths,
+    Elevation,
     MappingPath,
     Whole,
     chosen_mapping,
@@ -134,6 +135,7 @@ def calibrate(
     whole: Whole = False,
     mapping: MappingPath = None,
     dbc: DbcPaths = None,
+    elevation: Elevation = None,
     force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
 ) -> None:
     """Calibrate a vehicle from drives of known mass.
@@ -173,7 +175,7 @@ def calibrate(
         parts = []
         for path in drives:
             bar.begin(f"reading {path.name}", _READING)
-            parts.append(load_parts(path, chosen, dbc, whole=whole))
+            parts.append(load_parts(path, chosen, dbc, whole=whole, elevation=elevation))
         recorded = [drive for held in parts for drive in held]
         masses = masses_of_parts(parts, mass)
         for held in (h for h in parts if len(h) > 1):

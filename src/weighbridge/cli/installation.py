@@ -27,6 +27,7 @@ EXTRAS: Final[Mapping[str, str]] = {
     "tdms": "TDMS files",
     "ros": "ROS bags, MCAP",
     "openpilot": "openpilot logs",
+    "elevation": "elevation rasters",
     "live": "adapters, CAN, GNSS",
     "ble": "Bluetooth adapters",
     "mqtt": "sending to a broker",

@@ -49,6 +49,14 @@ DbcPaths = Annotated[
         metavar="FILE",
     ),
 ]
+Elevation = Annotated[
+    Optional[Path],  # noqa: UP045
+    typer.Option(
+        "--elevation",
+        help="Elevation raster (GeoTIFF) that gives the heights in place of the receiver.",
+        metavar="FILE.tif",
+    ),
+]
 SplitMb = Annotated[
     Optional[float],  # noqa: UP045
     typer.Option(
@@ -110,9 +118,19 @@ def load(path: Path, mapping: Path | None, dbc: list[str] | None = None) -> Driv
 
 
 def load_parts(
-    path: Path, mapping: Path | None, dbc: list[str] | None, *, whole: bool
+    path: Path,
+    mapping: Path | None,
+    dbc: list[str] | None,
+    *,
+    whole: bool,
+    elevation: Path | None = None,
 ) -> list[Drive]:
     """Read the drives of one recording; one where it is to be taken as a whole."""
     from weighbridge.io import read_drives
 
-    return [load(path, mapping, dbc)] if whole else read_drives(path, mapping, dbc or ())
+    drives = [load(path, mapping, dbc)] if whole else read_drives(path, mapping, dbc or ())
+    if elevation is None:
+        return drives
+    from weighbridge.io.elevation import with_elevation
+
+    return [with_elevation(drive, elevation) for drive in drives]

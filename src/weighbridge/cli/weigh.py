@@ -13,6 +13,7 @@ from weighbridge.cli.listed import method_names
 from weighbridge.cli.options import (
     DbcPaths,
     DrivePaths,
+    Elevation,
     MappingPath,
     ReportPath,
     Units,
@@ -112,6 +113,7 @@ def weigh(
     whole: Whole = False,
     mapping: MappingPath = None,
     dbc: DbcPaths = None,
+    elevation: Elevation = None,
 ) -> None:
     """Weigh a vehicle from one or more drives.
 
@@ -146,7 +148,7 @@ def weigh(
     settings = parsed(changes or [])
     shares = 1.0 + _COMPARING * compare + _REPORTING * (report is not None)
     with progress("weighing", len(drives) * shares) as bar:
-        given = partial(load_parts, mapping=chosen, dbc=dbc, whole=whole)
+        given = partial(load_parts, mapping=chosen, dbc=dbc, whole=whole, elevation=elevation)
         whole_wanted = compare or report is not None or track is not None
         rows: list[WeighingRow] = []
         failed: list[tuple[str, Problem]] = []
