@@ -37,6 +37,8 @@ _SHORT: Final[dict[str, tuple[str, ...]]] = {
     "applied": ("appd", "appl"),
     "estimated": ("est", "estd", "estmd"),
     "percent": ("pct", "perc"),
+    "load": ("ld",),
+    "calculated": ("cal", "calc"),
     "parking": ("prk", "park"),
     "gps": ("gnss",),
 }
@@ -73,10 +75,19 @@ OF_ANOTHER: Final = frozenset(
         "onskad", "onskat", "borvarde", "medel", "begard", "begart", "fel",
         "pozadovany", "pozadovana", "pozadovane", "prumerna", "prumerny", "maximalni", "chyba",
         "hedef", "istenen", "ortalama", "azami", "hata",
+        "media", "medio", "solicitado", "solicitada", "alvo", "demandado", "demandada", "pedido", "erro",
+        "demande", "demandee", "vise", "visee",
+        "средняя", "средний", "среднее", "макс", "максимальная", "максимальный", "мин", "минимальная",
+        "заданная", "заданный", "целевая", "целевой", "требуемый", "запрошенный", "ошибка", "коррекция",
+        "ограничение", "лимит",
+        "平均", "目标", "目標", "设定", "請求", "请求", "需求", "指令", "期望", "最大", "最小", "最高", "最低", "限速", "限制",
+        "故障", "状态", "单体", "要求", "単体",
+        "목표", "요구", "명령", "최대", "최소", "평균", "최고", "최저", "고장", "상태",
     )
 )  # fmt: skip
 """Words of a request, a bound, an average, a check or a state of a signal, in place of the signal;
-English, German, French, Spanish, Italian, Dutch, Polish, Swedish, Czech, Turkish."""
+English, German, French, Spanish, Italian, Portuguese, Dutch, Polish, Swedish, Czech, Turkish,
+Russian, Chinese, Japanese, Korean."""
 
 
 def spelled(words: Iterable[str]) -> tuple[str, ...]:

@@ -6,6 +6,7 @@ speed [rpm]``), and held against what loggers call each quantity in several lang
 
 from __future__ import annotations
 
+import itertools
 import re
 import unicodedata
 from collections.abc import Sequence
@@ -23,7 +24,7 @@ from weighbridge.signals.units import UNITS
 _NOISE: Final = frozenset(
     ("obd", "ii", "obd2", "obdii", "pid", "sensor", "sensors", "value", "raw", "rohwert", "data",
      "signal", "1", "01", "by", "wire", "drive", "bank", "of", "the", "in", "can", "ecu",
-     "location", "txt", "wgs", "der", "des", "du", "de", "la", "le", "el", "del", "della", "di",
+     "location", "main", "txt", "wgs", "der", "des", "du", "de", "la", "le", "el", "del", "della", "di",
      "do", "da", "from", "as")
 )  # fmt: skip
 """Words that say nothing of the quantity; the first of a kind is the one that others have alone."""
@@ -36,6 +37,15 @@ _ASPECTS: Final = {
                    "percentage")),
     ),
     "gear": frozenset(("position",)),
+    **dict.fromkeys(
+        ("brake_switch", "clutch_switch"),
+        frozenset(("switch", "signal", "contacteur", "interrupteur", "interruttore", "interruptor",
+                   "schalter", "schakelaar")),
+    ),
+    **dict.fromkeys(
+        ("battery_voltage", "battery_current", "engine_torque"),
+        frozenset(("sum", "total", "summe", "gesamt")),
+    ),
     **dict.fromkeys(
         ("engine_torque", "engine_torque_fraction"),
         frozenset(("at", "clutch", "crank", "crankshaft", "flywheel", "net")),
@@ -51,8 +61,22 @@ _BARE: Final = frozenset(
 """Words that are measured of many things, and name none by themselves at the end of a path."""
 
 
-_ALONG: Final = ("long", "lon", "longitudinal", "forward", "fwd")
+_ALONG: Final = ("long", "lon", "longitudinal", "forward", "fwd", "inline")
 _ACCEL_WORDS: Final = ("acc", "accel", "acceleration", "a", "g", "g force", "gforce")
+
+
+_LETTERS: Final = str.maketrans(
+    {"ß": "ss", "ł": "l", "Ł": "L", "ı": "i", "ø": "o", "Ø": "O", "（": "(", "）": ")",
+     "［": "[", "］": "]"}
+)  # fmt: skip
+"""Letters that are no letter with an accent, and brackets of another width."""
+
+
+def _plain(text: str) -> str:
+    """Return a text in small letters without accents."""
+    parted = unicodedata.normalize("NFKD", text.translate(_LETTERS))
+    kept = "".join(c for c in parted if not unicodedata.combining(c))
+    return unicodedata.normalize("NFC", kept).lower()
 
 
 def _phrases(quantity: str) -> tuple[str, ...]:
@@ -62,7 +86,7 @@ def _phrases(quantity: str) -> tuple[str, ...]:
         found += reported.get(quantity, ())
     if quantity == "longitudinal_accel":
         found += [f"{way} {kind}" for way in _ALONG for kind in _ACCEL_WORDS]
-    return tuple(found)
+    return tuple(map(_plain, found))
 
 
 _WANTED: Final = {
@@ -80,9 +104,11 @@ _WITH_UNIT: Final = {
 """Words that are a quantity only where the log states a unit of it: v may be volts as well, n a
 force, and gx an acceleration or a rate."""
 
-_NOT: Final = {q: frozenset(spelled(words)) | words for q, words in AGAINST.items()}
+_NOT: Final = {
+    q: frozenset(spelled(words)) | frozenset(map(_plain, words)) for q, words in AGAINST.items()
+}
 
-_TIMES: Final = TIME_PHRASES | frozenset(TIMES)
+_TIMES: Final = TIME_PHRASES | frozenset(map(_plain, TIMES))
 
 _SILENT: Final = _NOISE | SOURCES
 
@@ -91,6 +117,9 @@ _SHORTEST: Final = 3
 
 _LONGEST: Final = 40
 """Letters of a word at most that is put together of others."""
+
+_FIRST_SIGN: Final = "\u2e80"
+"""From here on, a writing has no blanks between its words, and each sign may be a word."""
 
 _VOCABULARY: Final = frozenset(
     word
@@ -102,8 +131,8 @@ _VOCABULARY: Final = frozenset(
         _SILENT,
         LONG,
     )
-    for word in words
-    if len(word) >= _SHORTEST
+    for word in map(_plain, words)
+    if len(word) >= _SHORTEST or word >= _FIRST_SIGN
 )
 """Words of which others may be put together without a mark: gpsspeed."""
 
@@ -127,9 +156,18 @@ _DIRECTIONS: Final[dict[str, frozenset[frozenset[str]]]] = {
 }
 """Words of the axes of an inertial sensor that is named by the vehicle's directions."""
 
+_SYMBOLS: Final = {
+    "n": "speed", "p": "pressure", "t": "temperature", "u": "voltage", "i": "current",
+    "r": "position", "m": "torque", "mom": "torque",
+}  # fmt: skip
+"""Symbols of physics before a name, as racing teams write it: nEngine, pManifold, rThrottle."""
+
 _OTHERWISE: Final[dict[str, str | None]] = {"gps": None, "ms": "mps"}
 """What a unit at the end of a name means where no quantity of that name has it: g/s may be the
 satellites', and ms m/s."""
+
+_OF_VEHICLE: Final = frozenset(("obd", "vehicle", "car", "wheel", "can", "ecu"))
+"""Words by which a speed is not that of satellites."""
 
 _SIDES: Final = frozenset(("front", "rear", "left", "right"))
 
@@ -144,8 +182,8 @@ _PIPED: Final = re.compile(r'"?(?P<name>[^"|]+)"?\|"(?P<unit>[^"|]*)"(?:\|[^|]*)
 _WORD_WIDE: Final = re.compile(r"([a-z][a-z0-9]+)_w$")
 """A label of a control unit with the mark of 16 bits, as Bosch writes it: nmot_w."""
 
-_SENDER: Final = re.compile(r"([A-Za-z]{2,4})_(?=[A-Za-z]{2})")
-"""A short mark before a name."""
+_SENDER: Final = re.compile(r"(?:(?<=[.:/])|^)([A-Za-z]{2,4})_(?=[A-Za-z]+[A-Za-z_])")
+"""A short mark before a name, or before the last part of a path."""
 
 _PATH: Final = re.compile(r"[/.\\:](?![^\[(]*[\])])")
 """Parts the places of a name that is a path; not within brackets, where a unit may have it."""
@@ -153,11 +191,10 @@ _PATH: Final = re.compile(r"[/.\\:](?![^\[(]*[\])])")
 _PID: Final = re.compile(r"[0-9A-Fa-f]{2}-(?=[A-Za-z])")
 """The number of an OBD-II parameter before its name, as WiCAN writes it: 0C-EngineRPM."""
 
-_LETTERS: Final = str.maketrans({"ß": "ss", "ł": "l", "Ł": "L", "ı": "i", "ø": "o", "Ø": "O"})
-"""Letters that are no letter with an accent."""
-
 _TAIL: Final = re.compile(r"[A-Za-z°%²/^]{2,8}\d?$")
-_WORD: Final = re.compile(r"[a-z]+|\d+")
+_WORD: Final = re.compile(r"[a-z]+|[^\W\d_a-z]+|\d+")
+_BUS: Final = re.compile(r"(?<![A-Za-z])(CAN|LIN|can|lin)\d+")
+"""The number of a bus."""
 _CAMEL: Final = re.compile(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
 
 
@@ -188,15 +225,17 @@ def words_of(name: str) -> tuple[str, ...]:
     """Words of a name in small letters, without accents and without units in brackets."""
     plain = _UNIT.sub(lambda found: _kept(found.group(1)), _piped(name))
     plain = _WORD_WIDE.sub(r"\1", plain)
-    plain = _CAMEL.sub(" ", plain)
-    plain = unicodedata.normalize("NFKD", plain.translate(_LETTERS))
-    plain = "".join(c for c in plain if not unicodedata.combining(c)).lower()
-    return tuple(part for word in _WORD.findall(plain) for part in _parts_of(word))
+    plain = _CAMEL.sub(" ", _BUS.sub(r"\1", plain))
+    return tuple(part for word in _WORD.findall(_plain(plain)) for part in _parts_of(word))
 
 
 @lru_cache(maxsize=4096)
 def _parts_of(word: str) -> tuple[str, ...]:
     """Known words that a word is put together of, the fewest; itself where it is one or none."""
+    if word >= _FIRST_SIGN:
+        return _signs_of(word[:_LONGEST])
+    if word[:3] == "gps" and len(word) == 4:
+        return ("gps", word[3])
     if word in _VOCABULARY or not 2 * _SHORTEST <= len(word) <= _LONGEST:
         return (word,)
     for k in range(len(word) - _SHORTEST, _SHORTEST - 1, -1):
@@ -209,11 +248,26 @@ def _parts_of(word: str) -> tuple[str, ...]:
     return (word,)
 
 
+def _signs_of(word: str) -> tuple[str, ...]:
+    """Words of a writing without blanks: as few unknown signs as can be, then as few words."""
+    best: list[tuple[int, int, tuple[str, ...]]] = [(0, 0, ())]
+    for end in range(1, len(word) + 1):
+        unknown, count, parts = best[end - 1]
+        ways = [(unknown + 1, count + 1, (*parts, word[end - 1]))]
+        for begin in range(end):
+            if word[begin:end] in _VOCABULARY:
+                unknown, count, parts = best[begin]
+                ways.append((unknown, count + 1, (*parts, word[begin:end])))
+        best.append(min(ways, key=lambda way: way[:2]))
+    return best[-1][2]
+
+
 def _piped(name: str) -> str:
     """A name with its unit in brackets, where the log parts name, unit and range by bars.
 
     The number of an OBD-II parameter before it is left out.
     """
+    name = name.translate(_LETTERS)
     if (number := _PID.match(name)) is not None:
         name = name[number.end() :]
     found = _PIPED.match(name)
@@ -281,6 +335,14 @@ def _recognised(name: str, words: tuple[str, ...], stated: str | None) -> Named:
     # A last word may be a unit or part of the name, as in ENGINE_RPM.
     whole = frozenset(spelled(words_of(name)))
     readings = {frozenset(spelled(words)), whole} | _last_place(name)
+    if len(words) > 1 and words[0] in _SYMBOLS:
+        readings.add(frozenset(spelled((_SYMBOLS[words[0]], *words[1:]))))
+    # The unit may be said twice, as in LOAD_PCT (%).
+    readings |= {
+        frozenset(w for w in said if len(w) < _SHORTEST or unit_suffix(w) != stated)
+        for said in tuple(readings)
+        if stated is not None
+    }
     best = Named("", stated, 0.0)
     for quantity, phrases in _WANTED.items():
         if _NOT.get(quantity, frozenset()) & whole and whole not in phrases:
@@ -341,7 +403,10 @@ def _score(words: frozenset[str], phrase: frozenset[str], aspects: frozenset[str
     said = words - silent or words - _SILENT or words
     # What is left of "current in" would name any current.
     needed = phrase if core <= _BARE else core
-    return len(core) / len(said) if needed <= words and core <= said else 0.0
+    if not (needed <= words and core <= said):
+        return 0.0
+    # A letter more, such as that of a channel, is half a word.
+    return len(core) / (len(core) + sum(0.5 if len(w) == 1 else 1.0 for w in said - core))
 
 
 def recognise_all(
@@ -372,6 +437,7 @@ def recognise_all(
         recognise(name, unit)
         for name, unit in zip(names, units or [None] * len(names), strict=True)
     ]
+    found = _of_receiver(names, found)
     found = _speed_of_satellites(list(names), found)
     found = _axes_by_direction(names, found)
     best: dict[str, int] = {}
@@ -407,13 +473,14 @@ def without_senders(names: Sequence[str]) -> list[str]:
 
     It is no word, and stands before several names.
     """
-    marks = [found.group(1) if (found := _SENDER.match(name)) else "" for name in names]
+    found = [_SENDER.search(name) for name in names]
+    marks = [each.group(1) if each else "" for each in found]
     known = _VOCABULARY | LONG.keys()
     return [
-        name[len(mark) + 1 :]
-        if mark and mark.lower() not in known and marks.count(mark) > 1
+        name[: each.start()] + name[each.end() :]
+        if each and mark.lower() not in known and marks.count(mark) > 1
         else name
-        for name, mark in zip(names, marks, strict=True)
+        for name, mark, each in zip(names, marks, found, strict=True)
     ]
 
 
@@ -471,13 +538,50 @@ def _axes_by_direction(names: Sequence[str], found: list[Named]) -> list[Named]:
     return [Named(at[k], n.unit, 1.0) if k in at else n for k, n in enumerate(found)]
 
 
+def _between_positions(found: Sequence[Named], place: int) -> bool:
+    """Whether the columns on both sides are of a receiver of satellites: a device has its own
+    together."""
+    beside = [found[k].quantity for k in (place - 1, place + 1) if 0 <= k < len(found)]
+    return len(beside) == 2 and all(q and QUANTITIES[q].table == "gnss" for q in beside)
+
+
+def _of_receiver(names: Sequence[str], found: list[Named]) -> list[Named]:
+    """Read what has the same words before it as the position, and nothing of the vehicle has.
+
+    So ``position.speed`` beside ``position.latitude`` is the receiver's.
+    """
+    at = {n.quantity: k for k, n in enumerate(found)}
+    if not {"latitude", "longitude"} <= at.keys():
+        return found
+    words = [words_of(name) for name in names]
+    pair = zip(words[at["latitude"]], words[at["longitude"]], strict=False)
+    before = tuple(a for a, _ in itertools.takewhile(lambda both: both[0] == both[1], pair))
+    inside = [bool(before) and w[: len(before)] == before for w in words]
+    engine = any(here and n.quantity in _ENGINE for here, n in zip(inside, found, strict=True))
+    if engine or not any(inside):
+        return found
+    read = list(found)
+    for k, (name, here) in enumerate(zip(names, inside, strict=True)):
+        if not here or found[k].quantity not in ("", "vehicle_speed"):
+            continue
+        stated, own = unit_of(name)
+        rest = own[len(before) :]
+        other = _recognised(" ".join(rest), rest, stated or found[k].unit)
+        quantity = "gnss_speed" if other.quantity == "vehicle_speed" else other.quantity
+        if quantity and QUANTITIES[quantity].table == "gnss":
+            read[k] = Named(quantity, other.unit, other.score)
+    return read
+
+
 def _speed_of_satellites(names: list[str], found: list[Named]) -> list[Named]:
     quantities = {n.quantity for n in found}
     if "latitude" not in quantities or "gnss_speed" in quantities:
         return found
     speeds = [k for k, n in enumerate(found) if n.quantity == "vehicle_speed"]
-    plain = [k for k in speeds if not {"obd", "vehicle", "car", "wheel"} & set(words_of(names[k]))]
+    plain = [k for k in speeds if not _OF_VEHICLE & set(words_of(names[k]))]
     alone = len(plain) == len(speeds)
-    if not plain or (alone and (len(plain) > 1 or quantities & _ENGINE)):
+    if alone and quantities & _ENGINE:
+        plain = [k for k in plain if _between_positions(found, k)]
+    if not plain or (alone and len(plain) > 1):
         return found
     return [Named("gnss_speed", n.unit, n.score) if k in plain else n for k, n in enumerate(found)]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 PHRASES: Final[dict[str, tuple[str, ...]]] = {
-    "vehicle_speed": ("v kph", "v kmh", "v mph", "v mps", "v fzg", "vfzg", "v veh", "vveh", "v vehicle", "veh v", "veh spd", "spd", "veh speed", "obd 2 speed", "kmph meas", "kmph", "kph", "kmh", "km h", "mph", "road speed", "engine road speed",
+    "vehicle_speed": ("v car", "v kph", "v kmh", "v mph", "v mps", "v fzg", "vfzg", "v veh", "vveh", "v vehicle", "veh v", "veh spd", "spd", "veh speed", "obd 2 speed", "kmph meas", "kmph", "kph", "kmh", "km h", "mph", "road speed", "engine road speed",
         "vehicle speed", "speed", "obd speed", "speed obd", "car speed", "wheel speed", "wheel based vehicle speed",
         "ground speed can", "velocity", "geschwindigkeit", "fahrgeschwindigkeit", "fahrzeuggeschwindigkeit",
         "vitesse", "vitesse vehicule", "velocidad", "velocidad vehiculo", "velocita", "velocita veicolo",
@@ -190,7 +190,7 @@ TIME_PHRASES: Final = frozenset(
         "device time", "gps time", "temps", "horodatage", "tiempo", "fecha hora", "hora", "tempo", "ora", "data ora", "datum",
         "elapsed", "elapsed time", "seconds elapsed", "seconds", "millis", "milliseconds", "utc", "utc time", "epoch",
         "time since start", "time utc", "unix time", "log time", "timestamps", "created at", "measured at", "sec", "ms",
-        "session time", "epoch time", "interval", "meta time", "relative time", "recording time", "logging time", "time since start in ms", "running time",
+        "session time", "epoch time", "interval", "meta time", "relative time", "recording time", "logging time", "time since start in ms", "running time", "ticks", "tick",
         "ts", "stamp", "log mono time", "local time", "elapsed seconds", "offset", "trip time", "time elapsed", "tijd", "timestamp ms", "unix timestamp", "yyyy mo dd hh mi ss sss",
     )
 )  # fmt: skip
