@@ -8,11 +8,11 @@ from typing import Final
 
 import numpy as np
 
-from weighbridge.io.columns import unit_suffix
+from weighbridge.io.columns import suffixes_of, unit_suffix
 from weighbridge.io.draft_column import DraftColumn
 from weighbridge.io.naming import unit_of
 from weighbridge.io.way import way_ratio
-from weighbridge.signals import Floats
+from weighbridge.signals import QUANTITIES, Floats
 from weighbridge.signals.units import UNITS, to_si
 
 SPEEDS: Final = ("kmh", "mph", "mps", "kn")
@@ -33,6 +33,19 @@ _FEWEST: Final = 10
 
 _PART: Final = 0.95
 """Part of them that lie on it [-]."""
+
+VACUUM: Final = 8_000.0
+"""Pressure in a manifold, at least: engines pull down to some 20 kPa [Pa]."""
+
+_BEYOND: Final = 0.01
+"""Part of the values that may be impossible in a unit: sensors fail now and then [-]."""
+
+_WHILE: Final = 3.0
+"""Time over which a speed changes by more than its steps [s]."""
+
+_ALONG: Final = 0.6
+"""Correlation of these changes with an acceleration, at least: grade is in the one, not in the
+other [-]."""
 
 _ALIKE: Final = 0.98
 """Correlation of two speeds of one vehicle, at least [-]."""
@@ -89,7 +102,55 @@ def with_judged_units(
                 question = f"states no unit; taken as {unit}, for {why}"
                 column = replace(column, unit=unit, question=question)
         judged.append(column)
-    return tuple(judged)
+    return _with_judged_accelerations(tuple(judged), reported)
+
+
+def _with_judged_accelerations(
+    columns: tuple[DraftColumn, ...], reported: Mapping[str, Values]
+) -> tuple[DraftColumn, ...]:
+    """Give accelerations without a stated unit the one in which one of them is how the speed
+    changes; three axes show theirs by gravity.
+    """
+    axes = [
+        c for c in columns if c.quantity == "longitudinal_accel" or c.quantity.startswith("accel_")
+    ]
+    speed = next((c for c in columns if c.quantity in ("vehicle_speed", "gnss_speed")), None)
+    if speed is None or len(axes) > 2 or any(c.stated for c in axes):
+        return columns
+    values = replace(reported[speed.name], unit=speed.unit)
+    gains = [_gain(values, reported[c.name]) for c in axes]
+    gain = max(gains, key=lambda pair: pair[1], default=(0.0, 0.0))
+    if gain[1] < _ALONG:
+        return columns
+    unit = min(
+        (u for u, other in UNITS.items() if other.dimension == "m/s^2"),
+        key=lambda u: abs(np.log(abs(gain[0]) * UNITS[u].factor)),
+    )
+    question = f"states no unit; taken as {unit}, for {speed.name!r} changes by that"
+    return tuple(replace(c, unit=unit, question=question) if c in axes else c for c in columns)
+
+
+def _gain(speed: Values, accel: Values) -> tuple[float, float]:
+    """Of an acceleration how much there is per change of speed, and how sure that is.
+
+    Returns
+    -------
+    gain : [unit of the acceleration / (m/s^2)]
+    correlation : [-]
+    """
+    known = np.isfinite(accel.time + accel.values)
+    moving = np.isfinite(speed.time + speed.values)
+    t, v = speed.time[moving], to_si(speed.values[moving], speed.unit)
+    if np.count_nonzero(known) < _FEWEST or t.size < _FEWEST:
+        return 0.0, 0.0
+    at, a = accel.time[known], accel.values[known]
+    whole = np.concatenate([[0.0], np.cumsum(0.5 * (a[1:] + a[:-1]) * np.diff(at))])
+    begin = np.arange(max(t[0], at[0]), min(t[-1], at[-1]), _WHILE)
+    change, sum_ = np.diff(np.interp(begin, t, v)), np.diff(np.interp(begin, at, whole))
+    if change.size < _FEWEST or np.ptp(change) == 0.0 or np.ptp(sum_) == 0.0:
+        return 0.0, 0.0
+    gain = float(np.polyfit(change, sum_, 1)[0])
+    return gain, float(abs(np.corrcoef(change, sum_)[0, 1]))
 
 
 def _judged(
@@ -143,3 +204,35 @@ def _by_steps(values: Floats) -> tuple[str, str]:
             if np.mean(np.abs(steps - np.round(steps)) < _WHOLE) >= _PART:
                 return unit, f"its values are whole {whole}"
     return "", ""
+
+
+def plausible_unit(name: str, quantity: str, values: Floats) -> tuple[str, str]:
+    """Unit in which values are those of a drive, the usual one first, and a question.
+
+    The unit is empty where they fit none.
+    """
+    q = QUANTITIES[quantity]
+    high = float(np.percentile(np.abs(values), 99.5))
+    if quantity in ("vehicle_speed", "gnss_speed"):
+        if "ego" in name.lower():
+            return "mps", "states no unit; of names with ego it is mps"
+        # Few drives stay below 60 km/h, and none is faster than 60 m/s.
+        unit = "kmh" if high > 45.0 or (quantity == "vehicle_speed" and high > 28.0) else "mps"
+        return unit, f"states no unit; its highest is {high:.3g}, taken as {unit}"
+    if quantity.startswith("gyro_"):
+        unit = "degps" if high > 3.0 else "radps"
+        return unit, f"states no unit; its highest is {high:.3g}, taken as {unit}"
+    if q.suffix == "pct":
+        unit = "ratio" if high <= 1.02 else "pct"
+        si = to_si(values, unit)
+        if np.mean((si < q.low) | (si > q.high)) > _BEYOND:
+            return "", f"not taken for {quantity}: its highest is {high:.3g}, and it states no unit"
+        return unit, f"states no unit; its highest is {high:.3g}, taken as {unit}"
+    usual = [q.suffix, *(s for s in suffixes_of(q) if s != q.suffix)]
+    low = VACUUM if quantity == "intake_pressure" else q.low
+    for unit in usual:
+        si = to_si(values, unit)
+        if np.mean((si < low) | (si > q.high)) <= _BEYOND:
+            sure = q.suffix in ("deg", "rpm", "v", "a") and unit == q.suffix
+            return unit, "" if sure else f"states no unit; taken as {unit}"
+    return "", f"not taken for {quantity}: it states no unit, and its values fit none"

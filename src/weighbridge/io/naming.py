@@ -17,15 +17,15 @@ from typing import Final
 from weighbridge.io.abbreviations import LONG, OF_ANOTHER, SOURCES, spelled
 from weighbridge.io.columns import UNKNOWN_UNIT, dimension_of, unit_refused, unit_suffix
 from weighbridge.io.languages import LANGUAGES, TIMES
-from weighbridge.io.phrases import AGAINST, PHRASES, TIME_PHRASES
+from weighbridge.io.phrases import AGAINST, BARE, PHRASES, TIME_PHRASES
 from weighbridge.signals import QUANTITIES
 from weighbridge.signals.units import UNITS
 
 _NOISE: Final = frozenset(
     ("obd", "ii", "obd2", "obdii", "pid", "sensor", "sensors", "value", "raw", "rohwert", "data",
      "signal", "1", "01", "by", "wire", "drive", "bank", "of", "the", "in", "can", "ecu",
-     "location", "main", "txt", "wgs", "der", "des", "du", "de", "la", "le", "el", "del", "della", "di",
-     "do", "da", "from", "as")
+     "location", "main", "txt", "wgs", "der", "des", "du", "de", "la", "le", "el", "del", "della",
+     "di", "do", "da", "from", "as")
 )  # fmt: skip
 """Words that say nothing of the quantity; the first of a kind is the one that others have alone."""
 
@@ -43,12 +43,12 @@ _ASPECTS: Final = {
                    "schalter", "schakelaar")),
     ),
     **dict.fromkeys(
-        ("battery_voltage", "battery_current", "engine_torque"),
-        frozenset(("sum", "total", "summe", "gesamt")),
+        ("battery_voltage", "battery_current"), frozenset(("sum", "total", "summe", "gesamt"))
     ),
     **dict.fromkeys(
         ("engine_torque", "engine_torque_fraction"),
-        frozenset(("at", "clutch", "crank", "crankshaft", "flywheel", "net")),
+        frozenset(("at", "clutch", "crank", "crankshaft", "flywheel", "net", "sum", "total",
+                   "summe")),
     ),
 }  # fmt: skip
 """Words that show how a quantity is measured, or where: with one of them, several or none it is the
@@ -98,6 +98,7 @@ _WANTED: Final = {
 _WITH_UNIT: Final = {
     "vehicle_speed": ("v",),
     "engine_speed": ("n", "ecm n", "ems n", "dme n", "pcm n"),
+    "gnss_speed": ("gps v",),
     **{f"accel_{a}": (f"g{a}",) for a in "xyz"},
     **{f"gyro_{a}": (f"g{a}", f"rot {a}", f"gy{a}") for a in "xyz"},
 }
@@ -135,6 +136,10 @@ _VOCABULARY: Final = frozenset(
     if len(word) >= _SHORTEST or word >= _FIRST_SIGN
 )
 """Words of which others may be put together without a mark: gpsspeed."""
+
+_BARE_NAMES: Final = {
+    _plain(word): quantity for quantity, words in BARE.items() for word in words.split()
+}
 
 _ENGINE: Final = frozenset(("engine_speed", "engine_load", "engine_torque", "mass_air_flow"))
 """Quantities of a table that an engine's control unit fills."""
@@ -360,6 +365,16 @@ def _recognised(name: str, words: tuple[str, ...], stated: str | None) -> Named:
     return best if best.score >= LEAST else Named("", stated, best.score)
 
 
+def bare_quantity(name: str) -> str:
+    """Quantity that a name may be which only says in what it is measured; empty for none.
+
+    So a voltage without more words may be that of the traction battery.
+    """
+    last = [part for part in _PATH.split(_piped(name)) if part.strip()][-1:]
+    words = frozenset(spelled(unit_of(last[0])[1])) - _SILENT if last else frozenset()
+    return _BARE_NAMES.get(next(iter(words)), "") if len(words) == 1 else ""
+
+
 def means_another(name: str, quantity: str) -> bool:
     """Whether a name has a word with which it is not that quantity, whatever its unit is."""
     words = frozenset(spelled(words_of(name)))
@@ -540,7 +555,8 @@ def _axes_by_direction(names: Sequence[str], found: list[Named]) -> list[Named]:
 
 def _between_positions(found: Sequence[Named], place: int) -> bool:
     """Whether the columns on both sides are of a receiver of satellites: a device has its own
-    together."""
+    together.
+    """
     beside = [found[k].quantity for k in (place - 1, place + 1) if 0 <= k < len(found)]
     return len(beside) == 2 and all(q and QUANTITIES[q].table == "gnss" for q in beside)
 

@@ -184,6 +184,13 @@ PHRASES: Final[dict[str, tuple[str, ...]]] = {
 """What loggers call each quantity: English, German, French, Spanish, Italian, Portuguese, Dutch;
 without accents, in small letters."""
 
+BARE: Final = {
+    "battery_voltage": "voltage u spannung tension voltaje tensione tensao spanning napiecie napeti gerilim напряжение 电压 電圧 전압",
+    "battery_current": "current i strom courant corriente corrente stroom prad proud akim ток 电流 電流 전류",
+    "vehicle_speed": "v",
+}
+"""Names that only say in what something is measured, by what it may be where the values fit."""
+
 TIME_PHRASES: Final = frozenset(
     (
         "time", "t", "timestamp", "time stamp", "zeit", "zeitstempel", "uhrzeit", "date", "datetime", "date time",
@@ -253,7 +260,8 @@ AGAINST: Final[dict[str, frozenset[str]]] = {
     "lambda_1": frozenset(("commanded", "voltage", "2", "current", "target", "desired")),
     "odometer": frozenset(("trip",)),
     "oil_temperature": frozenset(("transmission", "gearbox", "axle", "differential", "atf")),
-    **{f"accel_{a}": frozenset(("linear", "user", "gravity", "free", "without", "angular", "liniowe", "katowe")) for a in "xyz"},
+    "longitudinal_accel": frozenset(("gps", "gnss")),
+    **{f"accel_{a}": frozenset(("gps", "gnss", "linear", "user", "gravity", "free", "without", "angular", "liniowe", "katowe")) for a in "xyz"},
     **{f"gyro_{a}": frozenset(("accel", "acceleration", "uncalibrated", "vector", "bias", "drift")) for a in "xyz"},
 }  # fmt: skip
 """Words with which a name means something else."""
