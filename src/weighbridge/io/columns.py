@@ -44,8 +44,8 @@ UNIT_TEXTS: Final[dict[str, str]] = {
     "м/с": "mps", "м/с²": "mps2",
     "об/мин": "rpm", "об./мин": "rpm", "мин-1": "rpm", "转/分": "rpm", "转/分钟": "rpm",
     "回転/分": "rpm", "tpm": "rpm",
-    "t/min": "rpm", "trs/min": "rpm", "rot/min": "rpm", "нм": "nm", "н·м": "nm", "牛米": "nm",
-    "牛·米": "nm",
+    "t/min": "rpm", "tr/mn": "rpm", "trs/min": "rpm", "rot/min": "rpm", "нм": "nm",
+    "н·м": "nm", "牛米": "nm", "牛·米": "nm",
     "г/с": "gps", "кг/ч": "kgph", "л/ч": "lph", "кпа": "kpa", "бар": "bar", "кг": "kg",
     "квт": "kw", "вт": "w",
     "сек": "s", "с": "s", "мс": "ms", "秒": "s", "毫秒": "ms", "초": "s", "в": "v", "伏": "v",
@@ -54,6 +54,9 @@ UNIT_TEXTS: Final[dict[str, str]] = {
     "gm/sec": "gps",
 }  # fmt: skip
 """Units as people and loggers write them, and the suffix each means."""
+
+_TIMES: Final = re.compile(r"\s*[*•⋅∙x×]\s*")
+"""Signs of a product."""
 
 _SPELLED: Final = {
     "per": "/", "squared": "2",
@@ -109,7 +112,7 @@ def unit_suffix(text: str) -> str | None:
         return word
     found = UNIT_TEXTS.get(word)
     word = " ".join(word.replace("_", " ").split())
-    found = found or UNIT_TEXTS.get(word)
+    found = found or UNIT_TEXTS.get(word) or UNIT_TEXTS.get(_TIMES.sub("·", word))
     if found is None and " per " in word:
         short = "".join(_SPELLED.get(part, part) for part in word.split())
         return short if short in UNITS else UNIT_TEXTS.get(short)

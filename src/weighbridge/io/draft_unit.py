@@ -40,6 +40,22 @@ VACUUM: Final = 8_000.0
 _BEYOND: Final = 0.01
 """Part of the values that may be impossible in a unit: sensors fail now and then [-]."""
 
+_FAST: Final = 10.0
+"""Faster, a vehicle is in one of its highest gears now and then [m/s]."""
+
+_TURNS_PER_METRE: Final = 38.0
+"""Engine speed over vehicle speed in the highest gears: trucks have 50 rpm and more to 1 m/s, and
+cars with a motor and one gear 30 rad/s and less [rpm/(m/s)] or [rad/m]."""
+
+_TOP: Final = 60.0
+"""Speed of a vehicle at most, as `plausible_unit` has it [m/s]."""
+
+_HARDEST: Final = 0.99
+"""Part of the changes of speed that are smaller than the hardest braking [-]."""
+
+_GENTLE: Final = 0.45
+"""Deceleration of a stop at least, in the hardest of a drive: trucks reach 0.8 [m/s^2]."""
+
 _WHILE: Final = 3.0
 """Time over which a speed changes by more than its steps [s]."""
 
@@ -102,7 +118,29 @@ def with_judged_units(
                 question = f"states no unit; taken as {unit}, for {why}"
                 column = replace(column, unit=unit, question=question)
         judged.append(column)
-    return _with_judged_accelerations(tuple(judged), reported)
+    return _with_judged_turns(_with_judged_accelerations(tuple(judged), reported), reported)
+
+
+def _with_judged_turns(
+    columns: tuple[DraftColumn, ...], reported: Mapping[str, Values]
+) -> tuple[DraftColumn, ...]:
+    """Give an engine's speed without a stated unit the one that the vehicle's speed shows."""
+    speed = next((c for c in columns if c.quantity in ("vehicle_speed", "gnss_speed")), None)
+    engine = next((c for c in columns if c.quantity == "engine_speed" and not c.stated), None)
+    if speed is None or engine is None:
+        return columns
+    way = reported[speed.name]
+    v, turns = to_si(way.values, speed.unit), reported[engine.name]
+    known = np.isfinite(turns.time + turns.values)
+    if np.count_nonzero(known) < _FEWEST:
+        return columns
+    n = np.interp(way.time, turns.time[known], turns.values[known])
+    fast = np.isfinite(n + v) & (v > _FAST)
+    if np.count_nonzero(fast) < _FEWEST or np.quantile(n[fast] / v[fast], 0.1) > _TURNS_PER_METRE:
+        return columns
+    question = "states no unit; taken as radps, for so few turns to the way are none of an engine"
+    found = replace(engine, unit="radps", question=question)
+    return tuple(found if c is engine else c for c in columns)
 
 
 def _with_judged_accelerations(
@@ -166,7 +204,23 @@ def _judged(
         ratio = _ratio(speed, other)
         if unit := _nearest(ratio):
             return unit, f"{name!r} shows that speed"
-    return _by_steps(speed.values)
+    unit, why = _by_steps(speed.values)
+    return (unit, why) if unit else _by_pace(speed)
+
+
+def _by_pace(speed: Values) -> tuple[str, str]:
+    """Unit of a speed of a vehicle that stops and goes: in another one it would hardly brake."""
+    there = np.isfinite(speed.time + speed.values)
+    time, values = speed.time[there], np.abs(speed.values[there])
+    if values.size < _FEWEST or values.min() > 1.0 or values.max() > _TOP:
+        return "", ""
+    begin = np.arange(time[0], time[-1], _WHILE)
+    changes = np.abs(np.diff(np.interp(begin, time, values))) / _WHILE
+    if changes.size < _FEWEST or not np.quantile(changes, _HARDEST) > 0.0:
+        return "", ""
+    hardest = float(np.quantile(changes, _HARDEST))
+    slow = hardest * UNITS["kmh"].factor < _GENTLE
+    return ("mps", "in km/h it would hardly brake") if slow else ("", "")
 
 
 def _nearest(factor: float) -> str:

@@ -13,6 +13,7 @@ from typing import Final
 
 import numpy as np
 
+from weighbridge.constants import GRAVITY
 from weighbridge.io.draft_column import DraftColumn
 from weighbridge.io.draft_unit import VACUUM, Values, plausible_unit
 from weighbridge.io.naming import bare_quantity, means_another
@@ -35,6 +36,11 @@ FOUND: Final = ("vehicle_speed", "engine_speed", "mass_air_flow")
 _DRIVEN: Final = frozenset(("engine_torque", "engine_torque_fraction", "engine_power"))
 """Quantities that change while a vehicle drives."""
 
+ACCEL: Final = ("accel_x", "accel_y", "accel_z")
+
+_NEAR_GRAVITY: Final = 0.15
+"""Part by which the size of an acceleration may differ from gravity in the median [-]."""
+
 _SWITCHES: Final = frozenset(("brake_switch", "clutch_switch"))
 
 _STATES: Final = 4
@@ -45,6 +51,9 @@ _SAG: Final = 0.6
 
 _STEP: Final = 3.0
 """Time over which these changes are taken [s]."""
+
+_BRAKED: Final = 0.3
+"""Deceleration that is none of a coasting vehicle [m/s^2]."""
 
 _FEWEST: Final = 20
 """Rows in which something is to be seen."""
@@ -99,10 +108,12 @@ def with_judged_values(
     """
     columns = tuple(_without_gauge(c, reported) for c in _on_board(columns))
     columns = _without_constants(_without_levels(columns, reported))
+    columns = _with_gravity(columns, reported)
     for quantity, fits in (
         *zip(FOUND, (_moves, _turns, _breathes), strict=True),
         ("battery_voltage", _feeds),
         ("battery_current", _sags),
+        ("brake_switch", _brakes),
     ):
         columns = _found_by_values(columns, reported, quantity, fits)
     return columns
@@ -167,6 +178,32 @@ def _without_levels(
     return tuple(found)
 
 
+def _with_gravity(
+    columns: tuple[DraftColumn, ...], reported: Mapping[str, Values]
+) -> tuple[DraftColumn, ...]:
+    """Take three columns that gravity is in for a sensor's: ROS calls them linear, others G-X."""
+    axes = [
+        next((c for c in columns if not c.quantity and bare_quantity(c.name) == q), None)
+        for q in ACCEL
+    ]
+    if any(c is None for c in axes) or any(c.quantity in ACCEL for c in columns):
+        return columns
+    three = {c.name: q for c, q in zip(axes, ACCEL, strict=True) if c is not None}
+    values = {name: reported[name] for name in three if name in reported}
+    if len(values) < len(ACCEL) or any(v.unit not in ("", "mps2", "g") for v in values.values()):
+        return columns
+    size = float(np.nanmedian(np.linalg.norm([v.values for v in values.values()], axis=0)))
+    near = [u for u in ("g", "mps2") if abs(size * UNITS[u].factor / GRAVITY - 1.0) < _NEAR_GRAVITY]
+    if not near:
+        return columns
+    return tuple(
+        _taken(c, three[c.name], replace(values[c.name], unit=near[0]), "has gravity in it")
+        if c.name in three
+        else c
+        for c in columns
+    )
+
+
 def _without_constants(columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, ...]:
     """Take no constant, such as an engine's rated power, for what changes in a drive."""
     drives = any(
@@ -202,7 +239,8 @@ def _found_by_values(
     taken = {c.quantity for c in columns}
     if quantity in taken or (quantity == "vehicle_speed" and "gnss_speed" in taken):
         return columns
-    dimension = UNITS[QUANTITIES[quantity].suffix].dimension
+    suffix = QUANTITIES[quantity].suffix
+    dimension = UNITS[suffix or "ratio"].dimension
     known = {
         c.quantity: replace(reported[c.name], unit=c.unit)
         for c in columns
@@ -213,7 +251,9 @@ def _found_by_values(
         if c.quantity or c.name not in reported:
             continue
         values, bare = reported[c.name], bare_quantity(c.name) == quantity
-        if bare and not values.unit and np.any(np.isfinite(values.values)):
+        if not suffix:
+            values = replace(values, unit="ratio")
+        if bare and suffix and not values.unit and np.any(np.isfinite(values.values)):
             finite = values.values[np.isfinite(values.values)]
             values = replace(values, unit=plausible_unit(c.name, quantity, finite)[0])
         by_unit = values.unit in UNITS and UNITS[values.unit].dimension == dimension
@@ -223,22 +263,28 @@ def _found_by_values(
     if not fitting or not _alike([values for _, values in fitting]):
         return columns
     taken_for, values = fitting[0]
+    found = _taken(taken_for, quantity, values, "its name does not tell, but how it moves does")
+    found = replace(found, stated=bool(reported[taken_for.name].unit))
+    return tuple(found if c is taken_for else c for c in columns)
+
+
+def _taken(column: DraftColumn, quantity: str, values: Values, why: str) -> DraftColumn:
+    """Take a column that was nothing for a quantity."""
     there = values.values[np.isfinite(values.values)]
     low, usual, high = map(float, np.quantile(there, (0.0, 0.5, 1.0)))
-    found = replace(
-        taken_for,
+    return replace(
+        column,
         quantity=quantity,
-        unit=values.unit,
-        stated=bool(reported[taken_for.name].unit),
+        unit=values.unit if QUANTITIES[quantity].suffix else "",
+        stated=False,
         low=low,
         usual=usual,
         high=high,
         count=int(there.size),
         rows=np.isfinite(values.values),
-        question=f"its name does not tell; taken for {quantity} by its unit and by how it moves",
+        question=f"taken for {quantity}: {why}",
         unsure=True,
     )
-    return tuple(found if c is taken_for else c for c in columns)
 
 
 def _alike(several: Sequence[Values]) -> bool:
@@ -355,6 +401,22 @@ def _sags(values: Values, known: Mapping[str, Values]) -> bool:
     if a.size < _FEWEST or np.ptp(a) == 0.0 or np.ptp(b) == 0.0:
         return False
     return bool(abs(np.corrcoef(a, b)[0, 1]) > _SAG)
+
+
+def _brakes(values: Values, known: Mapping[str, Values]) -> bool:
+    """Whether the vehicle slows down while a switch is on, and not while it is off."""
+    speed = known.get("vehicle_speed") or known.get("gnss_speed")
+    states = np.unique(values.values[np.isfinite(values.values)])
+    if speed is None or states.size != 2 or states.tolist() != [0.0, 1.0]:
+        return False
+    time, v = _rising(speed)
+    later = np.searchsorted(time, time + _STEP)
+    first = np.flatnonzero((later < time.size) & (v > _SLOW))
+    slowing = (v[later[first]] - v[first]) / (time[later[first]] - time[first])
+    on = _at(values, time[first]) > 0.5
+    if min(np.count_nonzero(on), np.count_nonzero(~on)) < _FEWEST:
+        return False
+    return float(np.median(slowing[on])) < -_BRAKED < float(np.median(slowing[~on]))
 
 
 def _rising(values: Values) -> tuple[Floats, Floats]:

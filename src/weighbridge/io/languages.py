@@ -111,7 +111,7 @@ LANGUAGES: Final[dict[str, dict[str, tuple[str, ...]]]] = {
         "fuel_level": ("poziom paliwa", "ilosc paliwa"),
         "run_time": ("czas pracy silnika", "czas od uruchomienia silnika"),
         "gear": ("bieg", "aktualny bieg", "wybrany bieg"),
-        "brake_switch": ("hamulec", "pedal hamulca", "swiatlo stop"),
+        "brake_switch": ("hamulec zasadniczy", "hamulec", "pedal hamulca", "swiatlo stop"),
         "clutch_switch": ("sprzeglo", "pedal sprzegla"),
         "module_voltage": ("napiecie modulu sterujacego", "napiecie adaptera", "napiecie zasilania"),
         "odometer": ("przebieg", "licznik kilometrow"),
@@ -237,7 +237,7 @@ LANGUAGES: Final[dict[str, dict[str, tuple[str, ...]]]] = {
     },
     "German": {
         "engine_speed": ("drehzahl e maschine", "drehzahl elektromotor", "drehzahl", "motordrehzahl"),
-        "engine_torque": ("drehmoment e maschine", "drehmoment elektromotor", "moment e maschine", "mom ist", "drehmoment"),
+        "engine_torque": ("moment", "moment ist", "drehmoment e maschine", "drehmoment elektromotor", "moment e maschine", "mom ist", "drehmoment"),
         "engine_torque_fraction": ("motordrehmoment", "istmoment"),
         "reference_torque": ("referenzdrehmoment",),
         "vehicle_speed": ("tachogeschwindigkeit", "geschwindigkeit tacho", "raddrehgeschwindigkeit"),
@@ -256,6 +256,7 @@ LANGUAGES: Final[dict[str, dict[str, tuple[str, ...]]]] = {
         "battery_current": ("courant batterie", "courant batterie traction", "courant batterie hv", "intensite batterie", "courant bus"),
         "altitude": ("hauteur", "altitude gps"),
         "longitudinal_accel": ("acceleration longitudinale",),
+        "reference_torque": ("couple reference moteur", "couple reference",),
     },
     "Spanish": {
         "vehicle_speed": ("velocidad coche", "velocidad vehiculo", "velocidad auto"),
@@ -268,6 +269,7 @@ LANGUAGES: Final[dict[str, dict[str, tuple[str, ...]]]] = {
         "battery_current": ("corriente bateria", "corriente bateria hv", "intensidad bateria"),
         "brake_switch": ("freno", "pedal freno", "interruptor freno"),
         "longitudinal_accel": ("aceleracion longitudinal", "fuerza g longitudinal"),
+        "reference_torque": ("par referencia motor", "par referencia",),
     },
     "Italian": {
         "engine_speed": ("giri motore elettrico", "velocita motore elettrico", "regime motore"),
@@ -279,6 +281,7 @@ LANGUAGES: Final[dict[str, dict[str, tuple[str, ...]]]] = {
         "battery_current": ("corrente batteria", "corrente batteria hv", "corrente pacco batteria"),
         "brake_switch": ("freno", "pedale freno", "luci stop"),
         "gnss_course": ("direzione", "rotta"),
+        "reference_torque": ("coppia riferimento motore", "coppia riferimento",),
     },
     "Portuguese": {
         "vehicle_speed": ("velocidade", "velocidade veiculo", "velocidade carro", "velocidade tracao", "velocidade rodas tracao", "velocidade obd"),
@@ -311,6 +314,7 @@ LANGUAGES: Final[dict[str, dict[str, tuple[str, ...]]]] = {
         "longitudinal_accel": ("aceleracao longitudinal", "forca g aceleracao", "forca g longitudinal"),
         **{f"accel_{a}": (f"aceleracao {a}", f"acelerometro {a}", f"eixo {a} aceleracao") for a in "xyz"},
         **{f"gyro_{a}": (f"giroscopio {a}", f"velocidade angular {a}") for a in "xyz"},
+        "reference_torque": ("torque referencia motor", "torque referencia",),
     },
     "Russian": {
         "vehicle_speed": ("скорость", "скорость автомобиля", "скорость авто", "скорость машины", "скорость движения", "скорость тс", "скорость транспортного средства"),

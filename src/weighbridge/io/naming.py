@@ -24,8 +24,8 @@ from weighbridge.signals.units import UNITS
 _NOISE: Final = frozenset(
     ("obd", "ii", "obd2", "obdii", "pid", "sensor", "sensors", "value", "raw", "rohwert", "data",
      "signal", "1", "01", "by", "wire", "drive", "bank", "of", "the", "in", "can", "ecu",
-     "location", "main", "txt", "wgs", "der", "des", "du", "de", "la", "le", "el", "del", "della",
-     "di", "do", "da", "from", "as")
+     "location", "main", "txt", "ext", "extended", "rng", "wgs", "der", "des", "du", "de", "la",
+     "le", "el", "del", "della", "di", "do", "da", "from", "as")
 )  # fmt: skip
 """Words that say nothing of the quantity; the first of a kind is the one that others have alone."""
 
@@ -37,10 +37,17 @@ _ASPECTS: Final = {
                    "percentage")),
     ),
     "gear": frozenset(("position",)),
+    "vehicle_speed": frozenset(
+        ("tachograph", "tacho", "tacografo", "tachographe", "tachografu", "仪表")
+    ),
+    **dict.fromkeys(
+        ("latitude", "longitude", "altitude", "gnss_course", "gnss_accuracy", "hdop"),
+        frozenset(("gps", "position", "receiver", "satellite")),
+    ),
     **dict.fromkeys(
         ("brake_switch", "clutch_switch"),
         frozenset(("switch", "signal", "contacteur", "interrupteur", "interruttore", "interruptor",
-                   "schalter", "schakelaar")),
+                   "schalter", "schakelaar", "service", "servicio", "servizio", "roboczy")),
     ),
     **dict.fromkeys(
         ("battery_voltage", "battery_current"), frozenset(("sum", "total", "summe", "gesamt"))
@@ -48,7 +55,7 @@ _ASPECTS: Final = {
     **dict.fromkeys(
         ("engine_torque", "engine_torque_fraction"),
         frozenset(("at", "clutch", "crank", "crankshaft", "flywheel", "net", "sum", "total",
-                   "summe")),
+                   "summe", "净", "输出", "effective", "effectif", "effektiv")),
     ),
 }  # fmt: skip
 """Words that show how a quantity is measured, or where: with one of them, several or none it is the
@@ -61,9 +68,16 @@ _BARE: Final = frozenset(
 """Words that are measured of many things, and name none by themselves at the end of a path."""
 
 
-_ALONG: Final = ("long", "lon", "longitudinal", "forward", "fwd", "inline")
-_ACCEL_WORDS: Final = ("acc", "accel", "acceleration", "a", "g", "g force", "gforce")
+_ALONG: Final = ("long", "lon", "longitudinal", "forward", "fwd", "inline", "langs", "laengs")
+_ACCEL_WORDS: Final = (
+    "acc", "accel", "acceleration", "a", "g", "g force", "gforce", "accelerometer",
+)  # fmt: skip
 
+
+_MARK_OF_LIST: Final = re.compile(
+    r"\s*[:\[(]?\s*\b(?:[A-Z]{2,4}\d{3,}|PID_?[0-9A-F]{2,4})\b\s*[\])]?\s*"
+)
+"""What a tester calls a value in its list: IDE00021, PR030, PID_0D."""
 
 _LETTERS: Final = str.maketrans(
     {"ß": "ss", "ł": "l", "Ł": "L", "ı": "i", "ø": "o", "Ø": "O", "（": "(", "）": ")",
@@ -84,6 +98,9 @@ def _phrases(quantity: str) -> tuple[str, ...]:
     found = list(PHRASES.get(quantity, (quantity.replace("_", " "),)))
     for reported in LANGUAGES.values():
         found += reported.get(quantity, ())
+    if quantity == "engine_torque_fraction":
+        # Its unit distinguishes it.
+        found += _phrases("engine_torque")
     if quantity == "longitudinal_accel":
         found += [f"{way} {kind}" for way in _ALONG for kind in _ACCEL_WORDS]
     return tuple(map(_plain, found))
@@ -130,12 +147,19 @@ _VOCABULARY: Final = frozenset(
         *AGAINST.values(),
         OF_ANOTHER,
         _SILENT,
+        *_ASPECTS.values(),
         LONG,
     )
     for word in map(_plain, words)
     if len(word) >= _SHORTEST or word >= _FIRST_SIGN
 )
 """Words of which others may be put together without a mark: gpsspeed."""
+
+_BRAKES: Final = (
+    "brak", "brk", "bped", "brems", "frein", "fren", "freio", "travao", "hamul", "brzd", "broms",
+    "rempedaal", "тормоз", "制动", "刹车", *map(_plain, ("ブレーキ", "브레이크")),
+)  # fmt: skip
+"""Beginnings of words that have to do with brakes."""
 
 _BARE_NAMES: Final = {
     _plain(word): quantity for quantity, words in BARE.items() for word in words.split()
@@ -171,7 +195,31 @@ _OTHERWISE: Final[dict[str, str | None]] = {"gps": None, "ms": "mps"}
 """What a unit at the end of a name means where no quantity of that name has it: g/s may be the
 satellites', and ms m/s."""
 
-_OF_VEHICLE: Final = frozenset(("obd", "vehicle", "car", "wheel", "can", "ecu"))
+_MEASURED: Final = frozenset(
+    (
+        "actual",
+        "act",
+        "actl",
+        "feedback",
+        "fbk",
+        "fdbk",
+        "measured",
+        "meas",
+        "ist",
+        "istwert",
+        "current",
+        "cur",
+        "engaged",
+    )
+)
+"""Words of a signal that is measured and not wanted."""
+
+_WANTED_TOO: Final = frozenset(("engine_torque", "engine_torque_fraction", "gear"))
+"""Quantities of which a log often has what is measured and what is wanted."""
+
+_OF_VEHICLE: Final = (
+    frozenset(("obd", "vehicle", "car", "wheel", "can", "ecu")) | _ASPECTS["vehicle_speed"]
+)
 """Words by which a speed is not that of satellites."""
 
 _SIDES: Final = frozenset(("front", "rear", "left", "right"))
@@ -270,11 +318,12 @@ def _signs_of(word: str) -> tuple[str, ...]:
 def _piped(name: str) -> str:
     """A name with its unit in brackets, where the log parts name, unit and range by bars.
 
-    The number of an OBD-II parameter before it is left out.
+    The number of an OBD-II parameter before it is left out, and its mark in the list of a tester.
     """
     name = name.translate(_LETTERS)
     if (number := _PID.match(name)) is not None:
         name = name[number.end() :]
+    name = _MARK_OF_LIST.sub(" ", name).strip() or name
     found = _PIPED.match(name)
     return f"{found['name']} [{found['unit']}]" if found is not None else name
 
@@ -326,6 +375,8 @@ def recognise(name: str, unit: str | None = None) -> Named:
     """
     if len(name) > MOST_LETTERS:
         return Named("", unit, 0.0)
+    if unit_suffix(name) == "rpm":
+        name = "rpm"
     stated, words = unit_of(name)
     known = unit is not None and not unit.startswith(UNKNOWN_UNIT)
     found = _recognised(name, words, unit if known else stated or unit)
@@ -339,8 +390,8 @@ def _recognised(name: str, words: tuple[str, ...], stated: str | None) -> Named:
     """Recognise a column that states this unit; ``words`` are its name's without it."""
     # A last word may be a unit or part of the name, as in ENGINE_RPM.
     whole = frozenset(spelled(words_of(name)))
-    readings = {frozenset(spelled(words)), whole} | _last_place(name)
-    if len(words) > 1 and words[0] in _SYMBOLS:
+    readings = {frozenset(spelled(words)), whole} | _last_places(name)
+    if words[:1] and words[0] in _SYMBOLS and any(len(w) >= _SHORTEST for w in words[1:]):
         readings.add(frozenset(spelled((_SYMBOLS[words[0]], *words[1:]))))
     # The unit may be said twice, as in LOAD_PCT (%).
     readings |= {
@@ -349,8 +400,9 @@ def _recognised(name: str, words: tuple[str, ...], stated: str | None) -> Named:
         if stated is not None
     }
     best = Named("", stated, 0.0)
+    against = whole - _container(name)
     for quantity, phrases in _WANTED.items():
-        if _NOT.get(quantity, frozenset()) & whole and whole not in phrases:
+        if _NOT.get(quantity, frozenset()) & against and whole not in phrases:
             continue
         if stated is not None and not _can_be(quantity, stated):
             continue
@@ -368,11 +420,22 @@ def _recognised(name: str, words: tuple[str, ...], stated: str | None) -> Named:
 def bare_quantity(name: str) -> str:
     """Quantity that a name may be which only says in what it is measured; empty for none.
 
-    So a voltage without more words may be that of the traction battery.
+    So a voltage without more words may be that of the traction battery, a linear acceleration a
+    sensor's with gravity, and what has to do with brakes their switch.
     """
     last = [part for part in _PATH.split(_piped(name)) if part.strip()][-1:]
     words = frozenset(spelled(unit_of(last[0])[1])) - _SILENT if last else frozenset()
-    return _BARE_NAMES.get(next(iter(words)), "") if len(words) == 1 else ""
+    if len(words) == 1 and (found := _BARE_NAMES.get(next(iter(words)))):
+        return found
+    said = set(spelled(words_of(name)))
+    axis = said & set("xyz")
+    linear = "linear" in said and bool(said & {"acceleration", "accel"})
+    if len(axis) == 1 and (linear or not said - axis - {"g"}):
+        return f"accel_{axis.pop()}"
+    if said in ({"gx"}, {"gy"}, {"gz"}):
+        return f"accel_{said.pop()[1]}"
+    braking = any(word.startswith(_BRAKES) for word in said) and not said & _NOT["brake_switch"]
+    return "brake_switch" if braking else ""
 
 
 def means_another(name: str, quantity: str) -> bool:
@@ -395,11 +458,17 @@ def _can_be(quantity: str, unit: str) -> bool:
     return unit in UNITS and UNITS[unit].dimension == dimension_of(q)
 
 
-def _last_place(name: str) -> set[frozenset[str]]:
-    """Words of the last part of a name that is a path, where they alone name something."""
+def _container(name: str) -> frozenset[str]:
+    """Words of a path that only say that all is of the vehicle."""
+    inside = {word for part in _PATH.split(_piped(name))[:-1] for word in words_of(part)}
+    return frozenset(inside & {"vehicle", "car"})
+
+
+def _last_places(name: str) -> set[frozenset[str]]:
+    """Words of the last parts of a name that is a path, where they alone name something."""
     parts = [part for part in _PATH.split(_piped(name)) if part.strip()]
-    words = frozenset(spelled(words_of(parts[-1]))) if len(parts) > 1 else frozenset()
-    return {words} if words - _SILENT - _BARE else set()
+    ends = [frozenset(spelled(words_of(" ".join(parts[-k:])))) for k in range(1, len(parts))]
+    return {words for words in ends if words - _SILENT - _BARE}
 
 
 def _score(words: frozenset[str], phrase: frozenset[str], aspects: frozenset[str]) -> float:
@@ -456,11 +525,16 @@ def recognise_all(
     found = _speed_of_satellites(list(names), found)
     found = _axes_by_direction(names, found)
     best: dict[str, int] = {}
-    lengths = [len(words_of(name)) for name in names]
+    words = [set(words_of(name)) for name in names]
+    # What is measured comes before what may be wanted. Of names that say the same, the one without
+    # more words: "TPS" before "TPS raw".
+    order = [
+        (named.quantity in _WANTED_TOO and bool(said & _MEASURED), named.score, -len(said))
+        for said, named in zip(words, found, strict=True)
+    ]
     for k, named in enumerate(found):
         other = best.get(named.quantity)
-        # Of names that say the same, the one without more words: "TPS" before "TPS raw".
-        if other is None or (named.score, -lengths[k]) > (found[other].score, -lengths[other]):
+        if other is None or order[k] > order[other]:
             best[named.quantity] = k
     for quantity, k in list(best.items()):
         if quantity and (other_name := _sibling(names, found, k)):
@@ -567,7 +641,7 @@ def _of_receiver(names: Sequence[str], found: list[Named]) -> list[Named]:
     So ``position.speed`` beside ``position.latitude`` is the receiver's.
     """
     at = {n.quantity: k for k, n in enumerate(found)}
-    if not {"latitude", "longitude"} <= at.keys():
+    if not {"latitude", "longitude"} <= at.keys() or "gnss_speed" in at:
         return found
     words = [words_of(name) for name in names]
     pair = zip(words[at["latitude"]], words[at["longitude"]], strict=False)
