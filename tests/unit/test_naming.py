@@ -14,7 +14,7 @@ TOOLS = tomllib.loads((Path(__file__).parent / "tool_headers.toml").read_text("u
 LANGUAGES = tomllib.loads((Path(__file__).parent / "language_headers.toml").read_text("utf-8"))
 BY_VALUES = {
     ("battery_voltage", "module_voltage"), ("battery_voltage", ""), ("vehicle_speed", ""),
-    ("accelerator_pedal", ""),
+    ("accelerator_pedal", ""), ("brake_switch", ""),
 }  # fmt: skip
 """Pairs of what a name is taken for and is: values tell them apart, in `draft_values.py`."""
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from typing import Final
 
 _SHORT: Final[dict[str, tuple[str, ...]]] = {
-    "speed": ("spd", "spds"),
+    "speed": ("spd", "spds", "velocity", "vel"),
     "torque": ("trq", "tq", "toq", "torq", "trqe"),
     "vehicle": ("veh", "vhcl", "vehcl"),
     "engine": ("eng", "engn"),
@@ -28,14 +28,17 @@ _SHORT: Final[dict[str, tuple[str, ...]]] = {
     "pressure": ("pres", "prs", "press"),
     "throttle": ("thr", "thrtl", "throt"),
     "reference": ("ref", "refr"),
-    "transmission": ("trns", "trans", "tr", "tx", "gbx"),
+    "transmission": ("trns", "trans", "tr", "tx", "gbx", "gearbox", "getriebe"),
     "heading": ("hdg", "hdng"),
     "gear": ("gr",),
     "longitudinal": ("longi", "longt", "longit", "lgt"),
     "acceleration": ("acceln", "accn"),
     "beschleunigung": ("beschl",),
+    "geschwindigkeit": ("geschw",),
     "applied": ("appd", "appl"),
-    "estimated": ("est", "estd", "estmd"),
+    "estimated": ("est", "estd", "estmd", "estimate"),
+    "angular": ("ang",),
+    "rpm": ("revs",),
     "percent": (
         "pct",
         "perc",
@@ -61,7 +64,8 @@ SOURCES: Final = frozenset(
     (
         "imu", "vcu", "inv", "inverter", "mcu", "pcu", "hvc", "bms", "esp", "esc", "tcu", "tcm",
         "ecm", "pcm", "egs", "dme", "ins", "sg", "sig", "hsc", "act", "actl", "actual", "phys",
-        "measured", "meas", "feedback", "fbk", "fdbk", "detected", "estimated", "istwert", "ist",
+        "measured", "meas", "feedback", "fbk", "fdbk", "fb", "detected", "estimated", "istwert",
+        "ist",
         "reel", "sae",
     )
 )  # fmt: skip

@@ -26,7 +26,7 @@ from weighbridge.io.draft_text import text_format
 from weighbridge.io.draft_time import DraftTime, by_motion, find_times, is_number, swings
 from weighbridge.io.draft_unit import Values, plausible_unit, unit_in_name, with_judged_units
 from weighbridge.io.draft_values import FOUND, with_judged_values
-from weighbridge.io.naming import Named, bare_quantity, recognise_all, words_of
+from weighbridge.io.naming import LEAST, Named, bare_quantities, recognise_all, words_of
 from weighbridge.io.parquet import read_parquet
 from weighbridge.io.table import (
     RawTable,
@@ -51,6 +51,9 @@ _BESIDE: Final = frozenset(("engine_speed", "vehicle_speed", "gnss_speed"))
 
 _TELLING: Final = {UNITS[QUANTITIES[quantity].suffix].dimension for quantity in FOUND}
 """Dimensions of columns of any name that are held against others."""
+
+_FASTEST: Final = 400.0
+"""A speed without a unit that is larger is that of something that turns [km/h]."""
 
 _AXES: Final = (("x",), ("y",), ("z",))
 """Names of columns that show an axis and no more."""
@@ -169,7 +172,7 @@ def draft(path: Path, names: Sequence[str] = ()) -> Draft:
         _column(raw, name, found, stated=units.get(name))
         for name, found in zip(others, named, strict=True)
     )
-    columns = checked(columns)
+    columns = checked(_once(columns))
     times = by_motion(times, _swings(raw, columns))
     time = times[0]
     if time.row_rate is None:
@@ -195,6 +198,14 @@ def draft(path: Path, names: Sequence[str] = ()) -> Draft:
     return timed(found, time)
 
 
+def _once(columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, ...]:
+    """Take no column for a quantity by its size that another one is by its name."""
+    surest = {c.quantity: c for c in sorted(columns, key=lambda c: not c.unsure) if c.quantity}
+    return tuple(
+        c if not c.quantity or surest[c.quantity] is c else _nothing(c.name, "") for c in columns
+    )
+
+
 def _reported(
     raw: RawTable, time: DraftTime, units: Mapping[str, str], columns: Sequence[DraftColumn]
 ) -> dict[str, Values]:
@@ -204,7 +215,7 @@ def _reported(
     for index, name in enumerate(raw.names):
         unit = unit_in_name(name, units.get(name))
         by_unit = unit in UNITS and UNITS[unit].dimension in _TELLING
-        if name in wanted or by_unit or bare_quantity(name):
+        if name in wanted or by_unit or bare_quantities(name):
             with suppress(DriveError):
                 found[name] = Values(time.seconds, raw.numbers(index)[0], unit)
     return found
@@ -343,6 +354,9 @@ def draft_column(name: str, found: Named, values: Floats, stated: str | None) ->
     known = values[np.isfinite(values)]
     if known.size == 0:
         return _nothing(name, f"not taken for {found.quantity}: it has no values")
+    turns = found.quantity == "vehicle_speed" and found.unit is None and stated is None
+    if turns and float(np.quantile(known, 0.995)) > _FASTEST:
+        found = replace(found, quantity="engine_speed", score=LEAST)
     quantity = QUANTITIES[found.quantity]
     reported = stated if stated is not None and not stated.startswith(UNKNOWN_UNIT) else None
     unit, question, by_log = reported or found.unit, "", True

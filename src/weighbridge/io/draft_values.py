@@ -16,7 +16,7 @@ import numpy as np
 from weighbridge.constants import GRAVITY
 from weighbridge.io.draft_column import DraftColumn
 from weighbridge.io.draft_unit import VACUUM, Values, plausible_unit
-from weighbridge.io.naming import bare_quantity, means_another
+from weighbridge.io.naming import bare_quantities, means_another
 from weighbridge.signals import QUANTITIES, Floats
 from weighbridge.signals.units import UNITS, to_si
 
@@ -45,6 +45,12 @@ _SWITCHES: Final = frozenset(("brake_switch", "clutch_switch"))
 
 _STATES: Final = 4
 """Values of a switch, at most: J1939 has off, on, error and not available."""
+
+_DROPPED: Final = 0.02
+"""Part of a battery's voltages that may be lower: contactors open [-]."""
+
+_EMPTY: Final = 0.5
+"""Voltage of an empty battery under load over the usual one, at least [-]."""
 
 _SAG: Final = 0.6
 """Correlation of the changes of a battery's voltage and current, at least [-]."""
@@ -183,7 +189,7 @@ def _with_gravity(
 ) -> tuple[DraftColumn, ...]:
     """Take three columns that gravity is in for a sensor's: ROS calls them linear, others G-X."""
     axes = [
-        next((c for c in columns if not c.quantity and bare_quantity(c.name) == q), None)
+        next((c for c in columns if not c.quantity and q in bare_quantities(c.name)), None)
         for q in ACCEL
     ]
     if any(c is None for c in axes) or any(c.quantity in ACCEL for c in columns):
@@ -250,7 +256,7 @@ def _found_by_values(
     for c in columns:
         if c.quantity or c.name not in reported:
             continue
-        values, bare = reported[c.name], bare_quantity(c.name) == quantity
+        values, bare = reported[c.name], quantity in bare_quantities(c.name)
         if not suffix:
             values = replace(values, unit="ratio")
         if bare and suffix and not values.unit and np.any(np.isfinite(values.values)):
@@ -384,7 +390,10 @@ def _feeds(values: Values, known: Mapping[str, Values]) -> bool:
     """Whether a voltage is that of a battery that drives the vehicle."""
     _, volts = _rising(values)
     q = QUANTITIES["battery_voltage"]
-    return volts.size >= _FEWEST and float(np.median(volts)) >= ON_BOARD and volts.max() <= q.high
+    if volts.size < _FEWEST or volts.max() > q.high:
+        return False
+    lowest, usual = np.quantile(volts, (_DROPPED, 0.5))
+    return bool(usual >= ON_BOARD and lowest > _EMPTY * usual)
 
 
 def _sags(values: Values, known: Mapping[str, Values]) -> bool:

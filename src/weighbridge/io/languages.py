@@ -237,7 +237,7 @@ LANGUAGES: Final[dict[str, dict[str, tuple[str, ...]]]] = {
     },
     "German": {
         "engine_speed": ("drehzahl e maschine", "drehzahl elektromotor", "drehzahl", "motordrehzahl"),
-        "engine_torque": ("moment", "moment ist", "drehmoment e maschine", "drehmoment elektromotor", "moment e maschine", "mom ist", "drehmoment"),
+        "engine_torque": ("moment", "moment ist", "motorm", "drehmoment e maschine", "drehmoment elektromotor", "moment e maschine", "mom ist", "drehmoment"),
         "engine_torque_fraction": ("motordrehmoment", "istmoment"),
         "reference_torque": ("referenzdrehmoment",),
         "vehicle_speed": ("tachogeschwindigkeit", "geschwindigkeit tacho", "raddrehgeschwindigkeit"),

@@ -33,16 +33,16 @@ _ASPECTS: Final = {
     **dict.fromkeys(
         ("throttle", "relative_throttle", "commanded_throttle", "accelerator_pedal",
          "relative_pedal"),
-        frozenset(("position", "angle", "opening", "plate", "valve", "body", "percent",
+        frozenset(("position", "angle", "opening", "plate", "valve", "body", "servo", "percent",
                    "percentage")),
     ),
-    "gear": frozenset(("position",)),
+    "gear": frozenset(("position", "engine")),
     "vehicle_speed": frozenset(
         ("tachograph", "tacho", "tacografo", "tachographe", "tachografu", "仪表")
     ),
     **dict.fromkeys(
         ("latitude", "longitude", "altitude", "gnss_course", "gnss_accuracy", "hdop"),
-        frozenset(("gps", "position", "receiver", "satellite")),
+        frozenset(("gps", "position", "receiver", "satellite", "dd", "degrees", "decimal")),
     ),
     **dict.fromkeys(
         ("brake_switch", "clutch_switch"),
@@ -75,7 +75,7 @@ _ACCEL_WORDS: Final = (
 
 
 _MARK_OF_LIST: Final = re.compile(
-    r"\s*[:\[(]?\s*\b(?:[A-Z]{2,4}\d{3,}|PID_?[0-9A-F]{2,4})\b\s*[\])]?\s*"
+    r"\s*[:\[(]?\s*\b(?:[A-Z]{2,4}\d{3,}|PID[_ ]?(?:0x)?[0-9A-F]{2,4})\b\s*[\])]?\s*"
 )
 """What a tester calls a value in its list: IDE00021, PR030, PID_0D."""
 
@@ -114,8 +114,9 @@ _WANTED: Final = {
 
 _WITH_UNIT: Final = {
     "vehicle_speed": ("v",),
-    "engine_speed": ("n", "ecm n", "ems n", "dme n", "pcm n"),
+    "engine_speed": ("speed", "ne", "rev", "n", "ecm n", "ems n", "dme n", "pcm n"),
     "gnss_speed": ("gps v",),
+    "fuel_rate": ("fuel consumption", "consumption", "verbrauch"),
     **{f"accel_{a}": (f"g{a}",) for a in "xyz"},
     **{f"gyro_{a}": (f"g{a}", f"rot {a}", f"gy{a}") for a in "xyz"},
 }
@@ -162,7 +163,9 @@ _BRAKES: Final = (
 """Beginnings of words that have to do with brakes."""
 
 _BARE_NAMES: Final = {
-    _plain(word): quantity for quantity, words in BARE.items() for word in words.split()
+    _plain(word): [q for q, others in BARE.items() if word in others.split()]
+    for words in BARE.values()
+    for word in words.split()
 }
 
 _ENGINE: Final = frozenset(("engine_speed", "engine_load", "engine_torque", "mass_air_flow"))
@@ -241,8 +244,8 @@ _SENDER: Final = re.compile(r"(?:(?<=[.:/])|^)([A-Za-z]{2,4})_(?=[A-Za-z]+[A-Za-
 _PATH: Final = re.compile(r"[/.\\:](?![^\[(]*[\])])")
 """Parts the places of a name that is a path; not within brackets, where a unit may have it."""
 
-_PID: Final = re.compile(r"[0-9A-Fa-f]{2}-(?=[A-Za-z])")
-"""The number of an OBD-II parameter before its name, as WiCAN writes it: 0C-EngineRPM."""
+_PID: Final = re.compile(r"(?:(?:S\d+_)?PID_[0-9A-Fa-f]{2,4}_|[0-9A-Fa-f]{2}-)(?=[A-Za-z])")
+"""The number of an OBD-II parameter before its name: 0C-EngineRPM, S1_PID_0C_EngineRPM."""
 
 _TAIL: Final = re.compile(r"[A-Za-z°%²/^]{2,8}\d?$")
 _WORD: Final = re.compile(r"[a-z]+|[^\W\d_a-z]+|\d+")
@@ -277,6 +280,7 @@ class Named:
 def words_of(name: str) -> tuple[str, ...]:
     """Words of a name in small letters, without accents and without units in brackets."""
     plain = _UNIT.sub(lambda found: _kept(found.group(1)), _piped(name))
+    plain = plain.replace("% ", " percent ")
     plain = _WORD_WIDE.sub(r"\1", plain)
     plain = _CAMEL.sub(" ", _BUS.sub(r"\1", plain))
     return tuple(part for word in _WORD.findall(_plain(plain)) for part in _parts_of(word))
@@ -344,13 +348,21 @@ def unit_of(name: str) -> tuple[str | None, tuple[str, ...]]:
         suffix = unit_suffix(found)
         if suffix is not None:
             return suffix, words
-    parts = name.split("_")
-    # A unit may be spelled out in several words.
-    for count in (4, 3, 1):
+    parts = name.strip("_").split("_")
+    # A unit may be spelled out in several words, or its stroke be one of the marks: km_h.
+    for count in (4, 3, 2, 1):
         tail = " ".join(parts[-count:])
         gone = len(words_of(tail))
-        if len(parts) > count and len(words) > gone and (suffix := unit_suffix(tail)) is not None:
+        suffix = unit_suffix(tail)
+        if suffix is None and count == 2:
+            suffix = unit_suffix("/".join(parts[-2:]))
+        if len(parts) > count and len(words) > gone and suffix is not None:
             return suffix, words[: len(words) - gone]
+    humps = _CAMEL.sub(" ", parts[-1]).split()
+    for count in (2, 1):
+        tail = "".join(humps[-count:])
+        if len(humps) > count and len(tail) > 2 and (suffix := unit_suffix(tail)) is not None:
+            return suffix, words[: len(words) - len(words_of(" ".join(humps[-count:])))]
     last = name.split()
     if len(last) > 1 and (suffix := unit_suffix(last[-1].strip("()[],;"))) is not None:
         gone = len(words_of(last[-1]))
@@ -391,7 +403,7 @@ def _recognised(name: str, words: tuple[str, ...], stated: str | None) -> Named:
     # A last word may be a unit or part of the name, as in ENGINE_RPM.
     whole = frozenset(spelled(words_of(name)))
     readings = {frozenset(spelled(words)), whole} | _last_places(name)
-    if words[:1] and words[0] in _SYMBOLS and any(len(w) >= _SHORTEST for w in words[1:]):
+    if words[:1] and words[0] in _SYMBOLS and any(len(w) > 1 for w in words[1:]):
         readings.add(frozenset(spelled((_SYMBOLS[words[0]], *words[1:]))))
     # The unit may be said twice, as in LOAD_PCT (%).
     readings |= {
@@ -417,8 +429,8 @@ def _recognised(name: str, words: tuple[str, ...], stated: str | None) -> Named:
     return best if best.score >= LEAST else Named("", stated, best.score)
 
 
-def bare_quantity(name: str) -> str:
-    """Quantity that a name may be which only says in what it is measured; empty for none.
+def bare_quantities(name: str) -> frozenset[str]:
+    """Quantities that a name may be which only says in what it is measured.
 
     So a voltage without more words may be that of the traction battery, a linear acceleration a
     sensor's with gravity, and what has to do with brakes their switch.
@@ -426,16 +438,16 @@ def bare_quantity(name: str) -> str:
     last = [part for part in _PATH.split(_piped(name)) if part.strip()][-1:]
     words = frozenset(spelled(unit_of(last[0])[1])) - _SILENT if last else frozenset()
     if len(words) == 1 and (found := _BARE_NAMES.get(next(iter(words)))):
-        return found
+        return frozenset(found)
     said = set(spelled(words_of(name)))
     axis = said & set("xyz")
     linear = "linear" in said and bool(said & {"acceleration", "accel"})
     if len(axis) == 1 and (linear or not said - axis - {"g"}):
-        return f"accel_{axis.pop()}"
+        return frozenset((f"accel_{axis.pop()}",))
     if said in ({"gx"}, {"gy"}, {"gz"}):
-        return f"accel_{said.pop()[1]}"
+        return frozenset((f"accel_{said.pop()[1]}",))
     braking = any(word.startswith(_BRAKES) for word in said) and not said & _NOT["brake_switch"]
-    return "brake_switch" if braking else ""
+    return frozenset(("brake_switch",) if braking else ())
 
 
 def means_another(name: str, quantity: str) -> bool:
@@ -468,7 +480,7 @@ def _last_places(name: str) -> set[frozenset[str]]:
     """Words of the last parts of a name that is a path, where they alone name something."""
     parts = [part for part in _PATH.split(_piped(name)) if part.strip()]
     ends = [frozenset(spelled(words_of(" ".join(parts[-k:])))) for k in range(1, len(parts))]
-    return {words for words in ends if words - _SILENT - _BARE}
+    return {words for words in ends if any(len(w) > 1 for w in words - _SILENT - _BARE)}
 
 
 def _score(words: frozenset[str], phrase: frozenset[str], aspects: frozenset[str]) -> float:
@@ -621,7 +633,12 @@ def _axes_by_direction(names: Sequence[str], found: list[Named]) -> list[Named]:
         for quantity, spellings in _DIRECTIONS.items():
             if said in spellings and (named.unit is None or _can_be(quantity, named.unit)):
                 axes.setdefault(quantity, k)
-    if axes.keys() != _DIRECTIONS.keys() or {n.quantity for n in found} & {"accel_x", "gyro_x"}:
+    taken = {n.quantity for n in found}
+    rates = {f"gyro_{a}": names.index(f"g{a}") for a in "xyz" if f"g{a}" in names}
+    if len(rates) == 3 and {"accel_x", "accel_y", "accel_z"} <= taken and "gyro_x" not in taken:
+        # Beside ax, ay and az of an inertial sensor they are no accelerations.
+        axes = rates
+    elif axes.keys() != _DIRECTIONS.keys() or taken & {"accel_x", "gyro_x"}:
         return found
     at = {k: quantity for quantity, k in axes.items()}
     return [Named(at[k], n.unit, 1.0) if k in at else n for k, n in enumerate(found)]
