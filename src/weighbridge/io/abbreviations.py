@@ -52,7 +52,7 @@ _SHORT: Final[dict[str, tuple[str, ...]]] = {
         "百分比",
     ),
     "load": ("ld",),
-    "calculated": ("cal", "calc"),
+    "calculated": ("cal", "calc", "calculate"),
     "parking": ("prk", "park"),
     "gps": ("gnss",),
 }

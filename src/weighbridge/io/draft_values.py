@@ -139,8 +139,9 @@ def _on_board(columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, ...]:
         else c
         for c in columns
     )
-    low = {c.name for c in columns if c.quantity == "battery_voltage" and volts[c.name] < ON_BOARD}
-    if not low:
+    named = {c.name for c in columns if c.quantity == "battery_voltage"}
+    low = {name for name in named if volts[name] < ON_BOARD}
+    if not low and not (device and not named):
         return columns
     taken = any(c.quantity == "module_voltage" for c in columns)
     found = []
@@ -196,10 +197,16 @@ def _with_gravity(
         return columns
     three = {c.name: q for c, q in zip(axes, ACCEL, strict=True) if c is not None}
     values = {name: reported[name] for name in three if name in reported}
-    if len(values) < len(ACCEL) or any(v.unit not in ("", "mps2", "g") for v in values.values()):
+    if len(values) < len(ACCEL) or any(
+        v.unit not in ("", "mps2", "g", "mg") for v in values.values()
+    ):
         return columns
     size = float(np.nanmedian(np.linalg.norm([v.values for v in values.values()], axis=0)))
-    near = [u for u in ("g", "mps2") if abs(size * UNITS[u].factor / GRAVITY - 1.0) < _NEAR_GRAVITY]
+    near = [
+        u
+        for u in ("g", "mps2", "mg")
+        if abs(size * UNITS[u].factor / GRAVITY - 1.0) < _NEAR_GRAVITY
+    ]
     if not near:
         return columns
     return tuple(
@@ -218,8 +225,8 @@ def _without_constants(columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, .
         for c in columns
     )
     return tuple(
-        _nothing(c, "never changes while the vehicle drives")
-        if drives and c.quantity in _DRIVEN and c.low == c.high and c.count >= _FEWEST
+        _nothing(c, "hardly changes while the vehicle drives")
+        if drives and c.quantity in _DRIVEN and c.low >= _EMPTY * c.high and c.count >= _FEWEST
         else c
         for c in columns
     )

@@ -34,11 +34,12 @@ _ASPECTS: Final = {
         ("throttle", "relative_throttle", "commanded_throttle", "accelerator_pedal",
          "relative_pedal"),
         frozenset(("position", "angle", "opening", "plate", "valve", "body", "servo", "percent",
-                   "percentage")),
+                   "percentage", "engine")),
     ),
     "gear": frozenset(("position", "engine")),
     "vehicle_speed": frozenset(
-        ("tachograph", "tacho", "tacografo", "tachographe", "tachografu", "仪表")
+        ("tachograph", "tacho", "tacografo", "tachographe", "tachografu", "仪表", "odom",
+         "odometry")
     ),
     **dict.fromkeys(
         ("latitude", "longitude", "altitude", "gnss_course", "gnss_accuracy", "hdop"),
@@ -168,8 +169,11 @@ _BARE_NAMES: Final = {
     for word in words.split()
 }
 
-_ENGINE: Final = frozenset(("engine_speed", "engine_load", "engine_torque", "mass_air_flow"))
-"""Quantities of a table that an engine's control unit fills."""
+_ENGINE: Final = frozenset(
+    ("engine_speed", "engine_load", "engine_torque", "mass_air_flow", "engine_power",
+     "battery_voltage", "battery_current", "accelerator_pedal")
+)  # fmt: skip
+"""Quantities of a table that the vehicle's control units fill."""
 
 _RATE_WORDS: Final = ("rate", "velocity", "speed", "angular rate", "angular velocity")
 
@@ -238,7 +242,7 @@ _PIPED: Final = re.compile(r'"?(?P<name>[^"|]+)"?\|"(?P<unit>[^"|]*)"(?:\|[^|]*)
 _WORD_WIDE: Final = re.compile(r"([a-z][a-z0-9]+)_w$")
 """A label of a control unit with the mark of 16 bits, as Bosch writes it: nmot_w."""
 
-_SENDER: Final = re.compile(r"(?:(?<=[.:/])|^)([A-Za-z]{2,4})_(?=[A-Za-z]+[A-Za-z_])")
+_SENDER: Final = re.compile(r"(?:(?<=[.:/])|^)([A-Za-z]{2,4})\d?_(?=[A-Za-z]+[A-Za-z_])")
 """A short mark before a name, or before the last part of a path."""
 
 _PATH: Final = re.compile(r"[/.\\:](?![^\[(]*[\])])")
@@ -437,12 +441,14 @@ def bare_quantities(name: str) -> frozenset[str]:
     """
     last = [part for part in _PATH.split(_piped(name)) if part.strip()][-1:]
     words = frozenset(spelled(unit_of(last[0])[1])) - _SILENT if last else frozenset()
+    words -= _ASPECTS["battery_voltage"]
+    words = frozenset(w for w in words if len(w) > 1) or words
     if len(words) == 1 and (found := _BARE_NAMES.get(next(iter(words)))):
         return frozenset(found)
     said = set(spelled(words_of(name)))
     axis = said & set("xyz")
     linear = "linear" in said and bool(said & {"acceleration", "accel"})
-    if len(axis) == 1 and (linear or not said - axis - {"g"}):
+    if len(axis) == 1 and (linear or not said - axis - {"g", "axis"}):
         return frozenset((f"accel_{axis.pop()}",))
     if said in ({"gx"}, {"gy"}, {"gz"}):
         return frozenset((f"accel_{said.pop()[1]}",))
@@ -528,7 +534,7 @@ def recognise_all(
     -------
     One for each name.
     """
-    names = without_senders(names)
+    names = _positions_by_pair(without_senders(names))
     found = [
         recognise(name, unit)
         for name, unit in zip(names, units or [None] * len(names), strict=True)
@@ -650,6 +656,21 @@ def _between_positions(found: Sequence[Named], place: int) -> bool:
     """
     beside = [found[k].quantity for k in (place - 1, place + 1) if 0 <= k < len(found)]
     return len(beside) == 2 and all(q and QUANTITIES[q].table == "gnss" for q in beside)
+
+
+def _positions_by_pair(names: Sequence[str]) -> list[str]:
+    """Names of one log; of two that differ by latitude and longitude alone, no more than that."""
+    if any(recognise(name).quantity in ("latitude", "longitude") for name in names):
+        return list(names)
+    words = [frozenset(spelled(words_of(name))) for name in names]
+    for way, across in itertools.product(("latitude", "lat"), ("longitude", "lon", "long", "lng")):
+        for k, said in enumerate(words):
+            twin = said - {way} | {across}
+            moves = said & {*_ACCEL_WORDS, *_RATE_WORDS, "force"}
+            if way in said and len(said) > 1 and twin in words and not moves:
+                pair = {k: way, words.index(twin): across}
+                return [pair.get(j, name) for j, name in enumerate(names)]
+    return list(names)
 
 
 def _of_receiver(names: Sequence[str], found: list[Named]) -> list[Named]:
