@@ -11,10 +11,12 @@ from weighbridge.io.naming import is_time, recognise, recognise_all
 HEADERS = tomllib.loads((Path(__file__).parent / "logger_headers.toml").read_text("utf-8"))
 APPS = tomllib.loads((Path(__file__).parent / "app_headers.toml").read_text("utf-8"))
 TOOLS = tomllib.loads((Path(__file__).parent / "tool_headers.toml").read_text("utf-8"))
+UNSEEN = tomllib.loads((Path(__file__).parent / "unseen_headers.toml").read_text("utf-8"))
 LANGUAGES = tomllib.loads((Path(__file__).parent / "language_headers.toml").read_text("utf-8"))
 BY_VALUES = {
     ("battery_voltage", "module_voltage"), ("battery_voltage", ""), ("vehicle_speed", ""),
-    ("accelerator_pedal", ""), ("brake_switch", ""),
+    ("accelerator_pedal", ""), ("brake_switch", ""), ("battery_current", ""),
+    ("engine_power", ""), ("vehicle_speed", "engine_speed"),
 }  # fmt: skip
 """Pairs of what a name is taken for and is: values tell them apart, in `draft_values.py`."""
 
@@ -217,6 +219,20 @@ def test_tools_that_nothing_was_made_for(round):
     assert sum(right) >= 0.94 * len(pairs)
     wrong = [(f, m) for (f, m), ok in zip(pairs, right, strict=True) if f and not ok]
     assert len([w for w in wrong if (w[0], w[1][0]) not in BY_VALUES]) <= 1, wrong
+
+
+def test_headers_that_were_kept_back():
+    """With values, 0.94 and 0.91 of the columns that weigh were named when the two parts of this
+    table were first looked at; 0.74 of the first part before the names of other scripts."""
+    pairs = [
+        (found, meant.split("|"))
+        for told in UNSEEN.values()
+        for (_, meant, *_), found in zip(told["columns"], read(told["columns"]), strict=True)
+    ]
+    assert len(UNSEEN) >= 55
+    assert sum(found in meant for found, meant in pairs) >= 0.94 * len(pairs)
+    wrong = [(f, m[0]) for f, m in pairs if f and f not in m]
+    assert len([w for w in wrong if w not in BY_VALUES]) <= 6, wrong
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,7 @@ import numpy as np
 from weighbridge.constants import GRAVITY
 from weighbridge.io.draft_column import DraftColumn
 from weighbridge.io.draft_unit import VACUUM, Values, plausible_unit
-from weighbridge.io.naming import bare_quantities, means_another
+from weighbridge.io.naming import bare_quantities, means_another, words_of
 from weighbridge.signals import QUANTITIES, Floats
 from weighbridge.signals.units import UNITS, to_si
 
@@ -197,16 +197,13 @@ def _with_gravity(
         return columns
     three = {c.name: q for c, q in zip(axes, ACCEL, strict=True) if c is not None}
     values = {name: reported[name] for name in three if name in reported}
-    if len(values) < len(ACCEL) or any(
-        v.unit not in ("", "mps2", "g", "mg") for v in values.values()
-    ):
+    # One that is called linear reads 1 m/s^2 without gravity.
+    linear = any("linear" in words_of(name) for name in three)
+    units = ("mps2",) if linear else ("g", "mps2", "mg")
+    if len(values) < len(ACCEL) or any(v.unit not in ("", *units) for v in values.values()):
         return columns
     size = float(np.nanmedian(np.linalg.norm([v.values for v in values.values()], axis=0)))
-    near = [
-        u
-        for u in ("g", "mps2", "mg")
-        if abs(size * UNITS[u].factor / GRAVITY - 1.0) < _NEAR_GRAVITY
-    ]
+    near = [u for u in units if abs(size * UNITS[u].factor / GRAVITY - 1.0) < _NEAR_GRAVITY]
     if not near:
         return columns
     return tuple(

@@ -51,7 +51,8 @@ _ASPECTS: Final = {
                    "schalter", "schakelaar", "service", "servicio", "servizio", "roboczy")),
     ),
     **dict.fromkeys(
-        ("battery_voltage", "battery_current"), frozenset(("sum", "total", "summe", "gesamt"))
+        ("battery_voltage", "battery_current"),
+        frozenset(("sum", "total", "summe", "gesamt")),
     ),
     **dict.fromkeys(
         ("engine_torque", "engine_torque_fraction"),
@@ -76,7 +77,8 @@ _ACCEL_WORDS: Final = (
 
 
 _MARK_OF_LIST: Final = re.compile(
-    r"\s*[:\[(]?\s*\b(?:[A-Z]{2,4}\d{3,}|PID[_ ]?(?:0x)?[0-9A-F]{2,4})\b\s*[\])]?\s*"
+    r"\s*[:\[(]?\s*\b(?:[A-Z]{2,4}\d{3,}|PID[_ ]?(?:0x)?[0-9A-F]{2,4}|0x[0-9A-Fa-f]{2,4})\b"
+    r"\s*[\])]?\s*"
 )
 """What a tester calls a value in its list: IDE00021, PR030, PID_0D."""
 
@@ -171,7 +173,7 @@ _BARE_NAMES: Final = {
 
 _ENGINE: Final = frozenset(
     ("engine_speed", "engine_load", "engine_torque", "mass_air_flow", "engine_power",
-     "battery_voltage", "battery_current", "accelerator_pedal")
+     "battery_current", "accelerator_pedal")
 )  # fmt: skip
 """Quantities of a table that the vehicle's control units fill."""
 
@@ -341,7 +343,8 @@ def _kept(bracketed: str) -> str:
     word = bracketed.strip()
     plain = len(_WORD.findall(word.lower())) and word.lower() not in _MARKS
     reported = word.lower() == "gps" or unit_suffix(word) is None
-    return f" {word} " if plain and len(word) > 2 and reported else " "
+    axis = word.lower() in ("x", "y", "z")
+    return f" {word} " if axis or (plain and len(word) > 2 and reported) else " "
 
 
 def unit_of(name: str) -> tuple[str | None, tuple[str, ...]]:
@@ -416,7 +419,8 @@ def _recognised(name: str, words: tuple[str, ...], stated: str | None) -> Named:
         if stated is not None
     }
     best = Named("", stated, 0.0)
-    against = whole - _container(name)
+    # Revolutions per minute are no minimum.
+    against = whole - _container(name) - ({"min"} if stated == "rpm" else set())
     for quantity, phrases in _WANTED.items():
         if _NOT.get(quantity, frozenset()) & against and whole not in phrases:
             continue
@@ -582,7 +586,8 @@ def without_senders(names: Sequence[str]) -> list[str]:
     """
     found = [_SENDER.search(name) for name in names]
     marks = [each.group(1) if each else "" for each in found]
-    known = _VOCABULARY | LONG.keys()
+    words = {word for phrases in PHRASES.values() for phrase in phrases for word in phrase.split()}
+    known = _VOCABULARY | LONG.keys() | words
     return [
         name[: each.start()] + name[each.end() :]
         if each and mark.lower() not in known and marks.count(mark) > 1
