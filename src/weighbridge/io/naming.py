@@ -115,6 +115,12 @@ _WANTED: Final = {
 }
 """The words of each quantity, spelled out."""
 
+_WITH_WORD: Final = {
+    quantity: {word: [p for p in phrases if word in p] for word in frozenset().union(*phrases)}
+    for quantity, phrases in _WANTED.items()
+}
+"""The same by each of their words."""
+
 _WITH_UNIT: Final = {
     "vehicle_speed": ("v",),
     "engine_speed": ("speed", "ne", "rev", "n", "ecm n", "ems n", "dme n", "pcm n"),
@@ -418,6 +424,7 @@ def _recognised(name: str, words: tuple[str, ...], stated: str | None) -> Named:
         for said in tuple(readings)
         if stated is not None
     }
+    said_at_all = frozenset().union(*readings)
     best = Named("", stated, 0.0)
     # Revolutions per minute are no minimum.
     against = whole - _container(name) - ({"min"} if stated == "rpm" else set())
@@ -427,7 +434,9 @@ def _recognised(name: str, words: tuple[str, ...], stated: str | None) -> Named:
         if stated is not None and not _can_be(quantity, stated):
             continue
         aspects = _ASPECTS.get(quantity, frozenset())
-        score = max(_score(said, wanted, aspects) for said in readings for wanted in phrases)
+        near = {phrase for word in said_at_all for phrase in _WITH_WORD[quantity].get(word, ())}
+        pairs = itertools.product(readings, near)
+        score = max((_score(said, wanted, aspects) for said, wanted in pairs), default=0.0)
         if stated is not None and any(
             frozenset(said.split()) in readings for said in _WITH_UNIT.get(quantity, ())
         ):
