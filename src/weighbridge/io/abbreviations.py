@@ -66,7 +66,8 @@ SOURCES: Final = frozenset(
         "ecm", "pcm", "egs", "dme", "ins", "sg", "sig", "hsc", "act", "actl", "actual", "phys",
         "measured", "meas", "feedback", "fbk", "fdbk", "fb", "detected", "estimated", "istwert",
         "ist",
-        "reel", "sae",
+        "reel", "sae", "aktuell", "aktuelle", "aktueller", "aktuelles", "actuel", "actuelle",
+        "attuale", "atual", "aktualny", "aktualni", "текущии", "текущая", "实际", "当前",
     )
 )  # fmt: skip
 """Prefixes and endings that name who sends a signal, or that it is measured."""

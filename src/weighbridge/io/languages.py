@@ -239,12 +239,13 @@ LANGUAGES: Final[dict[str, dict[str, tuple[str, ...]]]] = {
         "engine_speed": ("drehzahl e maschine", "drehzahl elektromotor"),
         "engine_torque": ("moment", "moment ist", "motorm", "drehmoment e maschine", "drehmoment elektromotor", "moment e maschine", "mom ist"),
         "engine_torque_fraction": ("motordrehmoment", "istmoment"),
-        "reference_torque": ("referenzdrehmoment",),
+        "reference_torque": ("motorbezugsmoment", "motorreferenzmoment", "referenzdrehmoment",),
         "vehicle_speed": ("tachogeschwindigkeit", "geschwindigkeit tacho", "raddrehgeschwindigkeit"),
         "brake_switch": ("fahrer bremst", "bremst", "betriebsbremse", "bremspedalschalter"),
         "battery_voltage": ("hv spannung", "hochvolt spannung", "traktionsbatterie spannung", "spannung hv batterie", "spannung traktionsbatterie", "spannung batterie", "akkuspannung"),
         "battery_current": ("hv strom", "hochvolt strom", "traktionsbatterie strom", "strom hv batterie", "strom traktionsbatterie", "strom batterie", "akkustrom"),
         "mass_air_flow": ("lmm",),
+        "throttle": ("drosselklappenwinkel",),
     },
     "French": {
         "engine_speed": ("regime moteur electrique", "vitesse rotation moteur", "regime rotation moteur"),
@@ -278,6 +279,8 @@ LANGUAGES: Final[dict[str, dict[str, tuple[str, ...]]]] = {
         "brake_switch": ("luci stop",),
         "gnss_course": ("direzione", "rotta"),
         "reference_torque": ("coppia riferimento motore", "coppia riferimento"),
+        "gear": ("marcia innestata",),
+        "throttle": ("posizione acceleratore",),
     },
     "Portuguese": {
         "vehicle_speed": ("velocidade carro", "velocidade tracao", "velocidade rodas tracao", "velocidade obd"),
