@@ -55,6 +55,7 @@ _SHORT: Final[dict[str, tuple[str, ...]]] = {
     "calculated": ("cal", "calc", "calculate"),
     "parking": ("prk", "park"),
     "gps": ("gnss",),
+    "elevation": ("elev",),
 }
 
 LONG: Final = {short: word for word, shorts in _SHORT.items() for short in shorts}
@@ -66,7 +67,7 @@ SOURCES: Final = frozenset(
         "ecm", "pcm", "egs", "dme", "ins", "sg", "sig", "hsc", "act", "actl", "actual", "phys",
         "measured", "meas", "feedback", "fbk", "fdbk", "fb", "detected", "estimated", "istwert",
         "ist",
-        "reel", "sae", "aktuell", "aktuelle", "aktueller", "aktuelles", "actuel", "actuelle",
+        "reel", "sae", "aktuell", "aktuelle", "aktueller", "aktuelles", "aktuellt", "actuel", "actuelle",
         "attuale", "atual", "aktualny", "aktualni", "текущии", "текущая", "实际", "当前",
     )
 )  # fmt: skip
