@@ -222,8 +222,8 @@ def test_tools_that_nothing_was_made_for(round):
 
 
 def test_headers_that_were_kept_back():
-    """With values, 0.94, 0.91, 0.96 and 0.96 of the columns that weigh were named when the four parts
-    of this table were first looked at; 0.74 of the first part before."""
+    """With values, 0.94, 0.91, 0.96 and 0.96 of the columns that weigh were named when the four
+    parts of this table were first looked at; 0.74 of the first part before."""
     pairs = [
         (found, meant.split("|"))
         for told in UNSEEN.values()

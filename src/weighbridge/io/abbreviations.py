@@ -66,8 +66,8 @@ SOURCES: Final = frozenset(
         "imu", "vcu", "inv", "inverter", "mcu", "pcu", "hvc", "bms", "esp", "esc", "tcu", "tcm",
         "ecm", "pcm", "egs", "dme", "ins", "sg", "sig", "hsc", "act", "actl", "actual", "phys",
         "measured", "meas", "feedback", "fbk", "fdbk", "fb", "detected", "estimated", "istwert",
-        "ist",
-        "reel", "sae", "aktuell", "aktuelle", "aktueller", "aktuelles", "aktuellt", "actuel", "actuelle",
+        "ist", "reel", "sae", "aktuell", "aktuelle", "aktueller", "aktuelles", "aktuellt",
+        "actuel", "actuelle",
         "attuale", "atual", "aktualny", "aktualni", "текущии", "текущая", "实际", "当前",
     )
 )  # fmt: skip
