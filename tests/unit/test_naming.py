@@ -261,6 +261,42 @@ def test_words_that_say_more_or_nothing(name, meant):
     assert recognise(name).quantity == meant
 
 
+@pytest.mark.parametrize(
+    ("names", "meant"),
+    [
+        # What has the words of the position before it is the receiver's, unless all have them.
+        (
+            ["fix.latitude", "fix.longitude", "fix.speed", "can.engine.rpm"],
+            ["latitude", "longitude", "gnss_speed", "engine_speed"],
+        ),
+        (
+            ["zz.latitude", "zz.longitude", "zz.speed", "zz.rpm"],
+            ["latitude", "longitude", "vehicle_speed", "engine_speed"],
+        ),
+        # Between columns of a receiver stands its speed.
+        (
+            ["lat", "lon", "alt", "speed", "heading", "rpm"],
+            ["latitude", "longitude", "altitude", "gnss_speed", "gnss_course", "engine_speed"],
+        ),
+        (
+            ["lat", "lon", "speed", "rpm"],
+            ["latitude", "longitude", "vehicle_speed", "engine_speed"],
+        ),
+        # Two names that differ by latitude and longitude alone.
+        (["zzLat", "zzLon"], ["latitude", "longitude"]),
+        (["zzLat", "yyLon"], ["", ""]),
+        (["accLat", "accLon"], ["", "longitudinal_accel"]),
+        # Beside three accelerations.
+        (
+            ["ax", "ay", "az", "gx", "gy", "gz"],
+            [f"{k}_{a}" for k in ("accel", "gyro") for a in "xyz"],
+        ),
+    ],
+)
+def test_names_that_others_explain(names, meant):
+    assert [n.quantity for n in recognise_all(names)] == meant
+
+
 def test_of_two_motors_on_two_axles_neither_is_the_engine():
     names = ["Front Motor RPM", "Rear Motor RPM"]
     assert [n.quantity for n in recognise_all(names)] == ["", ""]

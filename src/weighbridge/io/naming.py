@@ -547,7 +547,7 @@ def recognise_all(
     -------
     One for each name.
     """
-    names = _positions_by_pair(without_senders(names))
+    names = _positions_by_pair(_without_root(without_senders(names)))
     found = [
         recognise(name, unit)
         for name, unit in zip(names, units or [None] * len(names), strict=True)
@@ -670,6 +670,18 @@ def _between_positions(found: Sequence[Named], place: int) -> bool:
     """
     beside = [found[k].quantity for k in (place - 1, place + 1) if 0 <= k < len(found)]
     return len(beside) == 2 and all(q and QUANTITIES[q].table == "gnss" for q in beside)
+
+
+def _without_root(names: Sequence[str]) -> list[str]:
+    """Names of one log without the first part of their paths, where all have the same one and it
+    is no word of a quantity.
+    """
+    parts = [_PATH.split(name, maxsplit=1) for name in names]
+    roots = {each[0] for each in parts}
+    if len(names) < 2 or len(roots) > 1 or any(len(each) < 2 or not each[1] for each in parts):
+        return list(names)
+    known = set(words_of(roots.pop())) & _VOCABULARY
+    return list(names) if known else [each[1] for each in parts]
 
 
 def _positions_by_pair(names: Sequence[str]) -> list[str]:
