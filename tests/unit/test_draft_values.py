@@ -88,3 +88,82 @@ def test_two_that_fit_and_differ_are_none(tmp_path):
 def test_no_speed_of_a_vehicle(tmp_path, values):
     found, _ = drafted(tmp_path, {"zz [km/h]": values})
     assert "vehicle_speed" not in found
+
+
+PULL = np.gradient(SPEED, DT)
+"""Acceleration along the vehicle [m/s^2]."""
+
+SHAKE = 0.2 * RNG.normal(size=(3, T.size))
+
+
+def units(whole):
+    return {c.quantity: c.unit for c in whole.known}
+
+
+def test_a_voltage_and_a_current_without_more_words(tmp_path):
+    amps = 60.0 * PULL * SPEED / 15.0 + 5.0
+    columns = {"Speed (km/h)": 3.6 * SPEED, "voltage": 390.0 - 0.1 * amps, "current": amps}
+    found, _ = drafted(tmp_path, columns)
+    assert (found["battery_voltage"], found["battery_current"]) == ("voltage", "current")
+    # What does not load the battery is none of its current.
+    fan = {**columns, "current": 3.0 * (T % 40.0 > 20.0)}
+    found, _ = drafted(tmp_path, fan)
+    assert "battery_current" not in found
+    # What stands for a speed, a tracker's cell and lights are none of its voltage.
+    for volts in (3.6 * SPEED, 4.0 + 0.0 * T, 14.0 + 0.0 * T):
+        assert "battery_voltage" not in drafted(tmp_path, {**columns, "voltage": volts})[0]
+
+
+def test_what_slows_the_vehicle_down_is_the_brake_s_switch(tmp_path):
+    columns = {"Speed (km/h)": 3.6 * SPEED, "BrkDrv2": (PULL < -0.6).astype(float)}
+    assert drafted(tmp_path, columns)[0]["brake_switch"] == "BrkDrv2"
+    for other in ((T % 50.0 > 25.0).astype(float), 0.0 * T):
+        assert "brake_switch" not in drafted(tmp_path, {**columns, "BrkDrv2": other})[0]
+    # A pressure or a position is no switch.
+    pressure = {"Speed (km/h)": 3.6 * SPEED, "brake": np.clip(-20.0 * PULL, 0.0, None)}
+    assert "brake_switch" not in drafted(tmp_path, pressure)[0]
+
+
+def test_the_rated_power_is_no_power(tmp_path):
+    columns = {"Speed (km/h)": 3.6 * SPEED, "ENGINE_POWER": np.full(T.size, 85.0)}
+    assert "engine_power" not in drafted(tmp_path, columns)[0]
+    columns["ENGINE_POWER"] = 20.0 * np.clip(PULL, 0.0, None) * SPEED
+    assert "engine_power" in drafted(tmp_path, columns)[0]
+
+
+@pytest.mark.parametrize("factor", [1.0, 1.0 / 9.80665])
+def test_the_speed_shows_the_unit_of_an_acceleration(tmp_path, factor):
+    columns = {"Speed (km/h)": 3.6 * SPEED, "Long Acc": factor * (PULL + SHAKE[0])}
+    whole = drafted(tmp_path, columns)[1]
+    assert units(whole)["longitudinal_accel"] == ("mps2" if factor == 1.0 else "g")
+
+
+@pytest.mark.parametrize("name", ["G-{}", "/imu/linear_acceleration.{}", "Axis {}"])
+@pytest.mark.parametrize("gravity", [True, False])
+def test_gravity_shows_a_raw_acceleration(tmp_path, name, gravity):
+    size = 9.80665 if name.startswith("/") else 1.0
+    axes = size * (0.05 * SHAKE + np.array([[0.1], [0.0], [float(gravity)]]))
+    columns = {name.format(a.upper() if "-" in name else a.lower()): x
+               for a, x in zip("xyz", axes, strict=True)}  # fmt: skip
+    found, whole = drafted(tmp_path, {"Speed (km/h)": 3.6 * SPEED, **columns})
+    assert ({"accel_x", "accel_y", "accel_z"} <= set(found)) == gravity
+    assert not gravity or units(whole)["accel_z"] == ("g" if size == 1.0 else "mps2")
+
+
+def test_positions_at_sea_are_in_radians(tmp_path):
+    east = np.cumsum(SPEED) * DT / 6.37e6
+    columns = {"lat": np.full(T.size, np.radians(47.0)), "lon": np.radians(8.0) + east}
+    assert units(drafted(tmp_path, columns)[1])["latitude"] == "rad"
+    assert units(drafted(tmp_path, {q: np.degrees(x) for q, x in columns.items()})[1])[
+        "latitude"
+    ] == "deg"  # fmt: skip
+
+
+def test_a_motor_s_speed_in_radians(tmp_path):
+    columns = {"Speed (km/h)": 3.6 * SPEED, "MotSpd": 25.0 * SPEED}
+    assert units(drafted(tmp_path, columns)[1])["engine_speed"] == "radps"
+    columns["MotSpd"] = 25.0 * SPEED * 30.0 / np.pi
+    assert units(drafted(tmp_path, columns)[1])["engine_speed"] == "rpm"
+    # A speed of some thousand is none of a vehicle.
+    found, _ = drafted(tmp_path, {"speed": 25.0 * SPEED * 30.0 / np.pi})
+    assert (found["engine_speed"], found.get("vehicle_speed")) == ("speed", None)

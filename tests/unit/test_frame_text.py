@@ -90,6 +90,14 @@ def gvret(sent, direction=True):
     return lines
 
 
+def absolute(sent):
+    lines = ['"Bus";"Time (abs)";"ID (hex)";"Ext";"DLC";"Data (hex)"']
+    for t, number, extended, data in sent:
+        row = ("CAN1", f"{t:.6f}", f"{number:X}", int(extended), len(data), data.hex(" "))
+        lines.append(";".join(f'"{cell}"' for cell in row))
+    return lines
+
+
 def crtd(sent):
     lines = [f"{EPOCH:.6f} CXX Info Type:crtd; Path:'/sd/drive.crtd'; Filter:off;"]
     for k, (t, number, extended, data) in enumerate(sent):
@@ -127,6 +135,7 @@ FORMS = {
     "spy.csv": ("table of CAN frames", vehicle_spy, 1e-6),
     "gvret.csv": ("table of CAN frames", gvret, 1e-6),
     "old.csv": ("table of CAN frames", lambda sent: gvret(sent, direction=False), 1e-6),
+    "abs.csv": ("table of CAN frames", absolute, 1e-6),
     "drive.crtd": ("OVMS CRTD", crtd, 1e-6),
     "crtd.log": ("OVMS CRTD", crtd, 1e-6),
     "king.txt": ("CanKing", canking, 1e-6),

@@ -11,7 +11,15 @@ from weighbridge.io.naming import is_time, recognise, recognise_all
 HEADERS = tomllib.loads((Path(__file__).parent / "logger_headers.toml").read_text("utf-8"))
 APPS = tomllib.loads((Path(__file__).parent / "app_headers.toml").read_text("utf-8"))
 TOOLS = tomllib.loads((Path(__file__).parent / "tool_headers.toml").read_text("utf-8"))
+UNSEEN = tomllib.loads((Path(__file__).parent / "unseen_headers.toml").read_text("utf-8"))
 LANGUAGES = tomllib.loads((Path(__file__).parent / "language_headers.toml").read_text("utf-8"))
+BY_VALUES = {
+    ("battery_voltage", "module_voltage"), ("battery_voltage", ""), ("vehicle_speed", ""),
+    ("accelerator_pedal", ""), ("brake_switch", ""), ("battery_current", ""),
+    ("engine_power", ""), ("vehicle_speed", "engine_speed"),
+}  # fmt: skip
+"""Pairs of what a name is taken for and is: values tell them apart, in `draft_values.py`."""
+
 LEAST_RIGHT = 0.95
 
 LEAST_OTHER_LANGUAGES = 0.8
@@ -72,7 +80,7 @@ def test_columns_in_nine_languages(held_out, least):
         for (_, meant, *_), found in zip(columns, read(columns), strict=True)
     ]
     assert sum(meant == found for meant, found in pairs) >= least * len(pairs)
-    assert not [p for p in pairs if p[1] and p[0] != p[1]]
+    assert not {(f, m) for m, f in pairs if f and m != f} - BY_VALUES
 
 
 @pytest.mark.parametrize(
@@ -196,10 +204,6 @@ def test_apps_that_nothing_was_made_for():
     assert right >= 0.97 * total
 
 
-BY_VALUES = {("battery_voltage", "module_voltage"), ("battery_voltage", ""), ("vehicle_speed", "")}
-"""Pairs of what a name is taken for and is: values tell them apart, in `draft_values.py`."""
-
-
 @pytest.mark.parametrize("round", [1, 2, 3])
 def test_tools_that_nothing_was_made_for(round):
     """Of the columns that weigh 0.79, 0.76 and 0.82 were named before; rounds 2 and 3 had 0.88 and
@@ -215,6 +219,20 @@ def test_tools_that_nothing_was_made_for(round):
     assert sum(right) >= 0.94 * len(pairs)
     wrong = [(f, m) for (f, m), ok in zip(pairs, right, strict=True) if f and not ok]
     assert len([w for w in wrong if (w[0], w[1][0]) not in BY_VALUES]) <= 1, wrong
+
+
+def test_headers_that_were_kept_back():
+    """With values, 0.94, 0.91, 0.96 and 0.96 of the columns that weigh were named when the four
+    parts of this table were first looked at; 0.74 of the first part before."""
+    pairs = [
+        (found, meant.split("|"))
+        for told in UNSEEN.values()
+        for (_, meant, *_), found in zip(told["columns"], read(told["columns"]), strict=True)
+    ]
+    assert len(UNSEEN) >= 95
+    assert sum(found in meant for found, meant in pairs) >= 0.94 * len(pairs)
+    wrong = [(f, m[0]) for f, m in pairs if f and f not in m]
+    assert len([w for w in wrong if w not in BY_VALUES]) <= 6, wrong
 
 
 @pytest.mark.parametrize(
@@ -241,6 +259,42 @@ def test_tools_that_nothing_was_made_for(round):
 )
 def test_words_that_say_more_or_nothing(name, meant):
     assert recognise(name).quantity == meant
+
+
+@pytest.mark.parametrize(
+    ("names", "meant"),
+    [
+        # What has the words of the position before it is the receiver's, unless all have them.
+        (
+            ["fix.latitude", "fix.longitude", "fix.speed", "can.engine.rpm"],
+            ["latitude", "longitude", "gnss_speed", "engine_speed"],
+        ),
+        (
+            ["zz.latitude", "zz.longitude", "zz.speed", "zz.rpm"],
+            ["latitude", "longitude", "vehicle_speed", "engine_speed"],
+        ),
+        # Between columns of a receiver stands its speed.
+        (
+            ["lat", "lon", "alt", "speed", "heading", "rpm"],
+            ["latitude", "longitude", "altitude", "gnss_speed", "gnss_course", "engine_speed"],
+        ),
+        (
+            ["lat", "lon", "speed", "rpm"],
+            ["latitude", "longitude", "vehicle_speed", "engine_speed"],
+        ),
+        # Two names that differ by latitude and longitude alone.
+        (["zzLat", "zzLon"], ["latitude", "longitude"]),
+        (["zzLat", "yyLon"], ["", ""]),
+        (["accLat", "accLon"], ["", "longitudinal_accel"]),
+        # Beside three accelerations.
+        (
+            ["ax", "ay", "az", "gx", "gy", "gz"],
+            [f"{k}_{a}" for k in ("accel", "gyro") for a in "xyz"],
+        ),
+    ],
+)
+def test_names_that_others_explain(names, meant):
+    assert [n.quantity for n in recognise_all(names)] == meant
 
 
 def test_of_two_motors_on_two_axles_neither_is_the_engine():

@@ -355,7 +355,7 @@ def _show(found: Draft, screen: Console) -> None:
         rate = f"{column.rate:.3g}" if column.rate > 0.0 else "-"
         table.add_row(shown(column.name), column.quantity, unit, *values, str(column.count), rate)
     screen.print(table)
-    others = [c.name for c in found.columns if not c.quantity and not c.question]
+    others = [c.name for c in found.columns if not (c.quantity or c.question) and c.name.strip()]
     if others:
         more = f" and {len(others) - _SHOWN} more" if len(others) > _SHOWN else ""
         names = ", ".join(shown(n) for n in others[:_SHOWN])

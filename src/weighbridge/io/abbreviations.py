@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from typing import Final
 
 _SHORT: Final[dict[str, tuple[str, ...]]] = {
-    "speed": ("spd", "spds"),
+    "speed": ("spd", "spds", "velocity", "vel"),
     "torque": ("trq", "tq", "toq", "torq", "trqe"),
     "vehicle": ("veh", "vhcl", "vehcl"),
     "engine": ("eng", "engn"),
@@ -15,7 +15,7 @@ _SHORT: Final[dict[str, tuple[str, ...]]] = {
     "wheel": ("whl", "whls"),
     "brake": ("brk", "brks"),
     "pedal": ("pdl", "pedl", "ped"),
-    "accel": ("accl", "accelr", "accr"),
+    "accel": ("accl", "accelr", "accr", "acel"),
     "position": ("pos", "posn", "psn", "pstn"),
     "switch": ("sw", "swt", "swtch"),
     "temperature": ("temp", "tmp", "tempr"),
@@ -28,17 +28,34 @@ _SHORT: Final[dict[str, tuple[str, ...]]] = {
     "pressure": ("pres", "prs", "press"),
     "throttle": ("thr", "thrtl", "throt"),
     "reference": ("ref", "refr"),
-    "transmission": ("trns", "trans", "tr", "tx", "gbx"),
+    "transmission": ("trns", "trans", "tr", "tx", "gbx", "gearbox", "getriebe"),
     "heading": ("hdg", "hdng"),
     "gear": ("gr",),
     "longitudinal": ("longi", "longt", "longit", "lgt"),
     "acceleration": ("acceln", "accn"),
     "beschleunigung": ("beschl",),
+    "geschwindigkeit": ("geschw",),
     "applied": ("appd", "appl"),
-    "estimated": ("est", "estd", "estmd"),
-    "percent": ("pct", "perc"),
+    "estimated": ("est", "estd", "estmd", "estimate"),
+    "angular": ("ang",),
+    "rpm": ("revs",),
+    "percent": (
+        "pct",
+        "perc",
+        "porcentaje",
+        "pourcentage",
+        "percentuale",
+        "percentual",
+        "prozent",
+        "procent",
+        "процент",
+        "百分比",
+    ),
+    "load": ("ld",),
+    "calculated": ("cal", "calc", "calculate"),
     "parking": ("prk", "park"),
     "gps": ("gnss",),
+    "elevation": ("elev",),
 }
 
 LONG: Final = {short: word for word, shorts in _SHORT.items() for short in shorts}
@@ -48,8 +65,10 @@ SOURCES: Final = frozenset(
     (
         "imu", "vcu", "inv", "inverter", "mcu", "pcu", "hvc", "bms", "esp", "esc", "tcu", "tcm",
         "ecm", "pcm", "egs", "dme", "ins", "sg", "sig", "hsc", "act", "actl", "actual", "phys",
-        "measured", "meas", "feedback", "fbk", "fdbk", "detected", "estimated", "istwert", "ist",
-        "reel", "sae",
+        "measured", "meas", "feedback", "fbk", "fdbk", "fb", "detected", "estimated", "istwert",
+        "ist", "reel", "sae", "aktuell", "aktuelle", "aktueller", "aktuelles", "aktuellt",
+        "actuel", "actuelle",
+        "attuale", "atual", "aktualny", "aktualni", "текущии", "текущая", "实际", "当前",
     )
 )  # fmt: skip
 """Prefixes and endings that name who sends a signal, or that it is measured."""
@@ -73,10 +92,23 @@ OF_ANOTHER: Final = frozenset(
         "onskad", "onskat", "borvarde", "medel", "begard", "begart", "fel",
         "pozadovany", "pozadovana", "pozadovane", "prumerna", "prumerny", "maximalni", "chyba",
         "hedef", "istenen", "ortalama", "azami", "hata",
+        "media", "medio", "solicitado", "solicitada", "alvo", "demandado", "demandada", "pedido",
+        "erro",
+        "demande", "demandee", "vise", "visee",
+        "средняя", "средний", "среднее", "макс", "максимальная", "максимальный", "мин",
+        "минимальная",
+        "заданная", "заданный", "целевая", "целевой", "требуемый", "запрошенный", "ошибка",
+        "коррекция",
+        "ограничение", "лимит",
+        "平均", "目标", "目標", "设定", "請求", "请求", "需求", "指令", "期望", "最大", "最小",
+        "最高", "最低", "限速", "限制",
+        "故障", "状态", "单体", "要求", "単体",
+        "목표", "요구", "명령", "최대", "최소", "평균", "최고", "최저", "고장", "상태",
     )
 )  # fmt: skip
 """Words of a request, a bound, an average, a check or a state of a signal, in place of the signal;
-English, German, French, Spanish, Italian, Dutch, Polish, Swedish, Czech, Turkish."""
+English, German, French, Spanish, Italian, Portuguese, Dutch, Polish, Swedish, Czech, Turkish,
+Russian, Chinese, Japanese, Korean."""
 
 
 def spelled(words: Iterable[str]) -> tuple[str, ...]:

@@ -38,8 +38,25 @@ UNIT_TEXTS: Final[dict[str, str]] = {
     "unit_newtometer": "nm", "unit_degrecelsi": "degc", "unit_volt": "v", "unit_amper": "a",
     "unit_meterperseconsquar": "mps2", "unit_degreofarc": "deg", "unit_secon": "s",
     "sec": "s", "seconds": "s", "µs": "us", "μs": "us",
+    **dict.fromkeys(("km/std", "km/u", "km/uur", "km/t", "km/tim", "km/sa", "km/saat", "km/hod",
+                     "km/godz", "km/ora"), "kmh"),
+    "км/ч": "kmh", "км/час": "kmh", "公里/小时": "kmh", "公里/时": "kmh", "千米/时": "kmh",
+    "м/с": "mps", "м/с²": "mps2",
+    "об/мин": "rpm", "об./мин": "rpm", "мин-1": "rpm", "转/分": "rpm", "转/分钟": "rpm",
+    "回転/分": "rpm", "tpm": "rpm",
+    "t/min": "rpm", "tr/mn": "rpm", "trs/min": "rpm", "rot/min": "rpm", "нм": "nm",
+    "н·м": "nm", "牛米": "nm", "牛·米": "nm",
+    "г/с": "gps", "кг/ч": "kgph", "л/ч": "lph", "кпа": "kpa", "бар": "bar", "кг": "kg",
+    "квт": "kw", "вт": "w",
+    "сек": "s", "с": "s", "мс": "ms", "秒": "s", "毫秒": "ms", "초": "s", "в": "v", "伏": "v",
+    "安": "a",
+    "град": "deg", "град.": "deg", "度": "deg", "м": "m", "米": "m", "per": "pct", "gm/s": "gps",
+    "gm/sec": "gps",
 }  # fmt: skip
 """Units as people and loggers write them, and the suffix each means."""
+
+_TIMES: Final = re.compile(r"\s*[*•⋅∙x×]\s*")
+"""Signs of a product."""
 
 _SPELLED: Final = {
     "per": "/", "squared": "2",
@@ -95,7 +112,7 @@ def unit_suffix(text: str) -> str | None:
         return word
     found = UNIT_TEXTS.get(word)
     word = " ".join(word.replace("_", " ").split())
-    found = found or UNIT_TEXTS.get(word)
+    found = found or UNIT_TEXTS.get(word) or UNIT_TEXTS.get(_TIMES.sub("·", word))
     if found is None and " per " in word:
         short = "".join(_SPELLED.get(part, part) for part in word.split())
         return short if short in UNITS else UNIT_TEXTS.get(short)

@@ -19,15 +19,14 @@ from weighbridge.io.columns import (
     UNKNOWN_UNIT,
     dimension_of,
     stated_unit,
-    suffixes_of,
     unit_refused,
 )
 from weighbridge.io.draft_column import DraftColumn, checked, is_calculated, usual_rate
 from weighbridge.io.draft_text import text_format
 from weighbridge.io.draft_time import DraftTime, by_motion, find_times, is_number, swings
-from weighbridge.io.draft_unit import Values, unit_in_name, with_judged_units
-from weighbridge.io.draft_values import FOUND, VACUUM, with_judged_values
-from weighbridge.io.naming import Named, recognise_all, words_of
+from weighbridge.io.draft_unit import Values, plausible_unit, unit_in_name, with_judged_units
+from weighbridge.io.draft_values import FOUND, with_judged_values
+from weighbridge.io.naming import LEAST, Named, bare_quantities, recognise_all, words_of
 from weighbridge.io.parquet import read_parquet
 from weighbridge.io.table import (
     RawTable,
@@ -52,6 +51,9 @@ _BESIDE: Final = frozenset(("engine_speed", "vehicle_speed", "gnss_speed"))
 
 _TELLING: Final = {UNITS[QUANTITIES[quantity].suffix].dimension for quantity in FOUND}
 """Dimensions of columns of any name that are held against others."""
+
+_FASTEST: Final = 400.0
+"""A speed without a unit that is larger is that of something that turns [km/h]."""
 
 _AXES: Final = (("x",), ("y",), ("z",))
 """Names of columns that show an axis and no more."""
@@ -170,12 +172,13 @@ def draft(path: Path, names: Sequence[str] = ()) -> Draft:
         _column(raw, name, found, stated=units.get(name))
         for name, found in zip(others, named, strict=True)
     )
-    columns = checked(columns)
+    columns = checked(_once(columns))
     times = by_motion(times, _swings(raw, columns))
     time = times[0]
     if time.row_rate is None:
         in_numbers = _reported(raw, time, units, columns)
-        columns = with_judged_values(with_judged_units(columns, in_numbers), in_numbers)
+        columns = with_judged_values(columns, in_numbers)
+        columns = with_judged_units(columns, in_numbers)
     found = Draft(
         path=path,
         text=text,
@@ -195,6 +198,14 @@ def draft(path: Path, names: Sequence[str] = ()) -> Draft:
     return timed(found, time)
 
 
+def _once(columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, ...]:
+    """Take no column for a quantity by its size that another one is by its name."""
+    surest = {c.quantity: c for c in sorted(columns, key=lambda c: not c.unsure) if c.quantity}
+    return tuple(
+        c if not c.quantity or surest[c.quantity] is c else _nothing(c.name, "") for c in columns
+    )
+
+
 def _reported(
     raw: RawTable, time: DraftTime, units: Mapping[str, str], columns: Sequence[DraftColumn]
 ) -> dict[str, Values]:
@@ -203,7 +214,8 @@ def _reported(
     wanted = {c.name for c in columns if c.quantity}
     for index, name in enumerate(raw.names):
         unit = unit_in_name(name, units.get(name))
-        if name in wanted or (unit in UNITS and UNITS[unit].dimension in _TELLING):
+        by_unit = unit in UNITS and UNITS[unit].dimension in _TELLING
+        if name in wanted or by_unit or bare_quantities(name):
             with suppress(DriveError):
                 found[name] = Values(time.seconds, raw.numbers(index)[0], unit)
     return found
@@ -342,6 +354,9 @@ def draft_column(name: str, found: Named, values: Floats, stated: str | None) ->
     known = values[np.isfinite(values)]
     if known.size == 0:
         return _nothing(name, f"not taken for {found.quantity}: it has no values")
+    turns = found.quantity == "vehicle_speed" and found.unit is None and stated is None
+    if turns and float(np.quantile(known, 0.995)) > _FASTEST:
+        found = replace(found, quantity="engine_speed", score=LEAST)
     quantity = QUANTITIES[found.quantity]
     reported = stated if stated is not None and not stated.startswith(UNKNOWN_UNIT) else None
     unit, question, by_log = reported or found.unit, "", True
@@ -354,7 +369,7 @@ def draft_column(name: str, found: Named, values: Floats, stated: str | None) ->
         question = _beyond(found.quantity, unit, known)
     else:
         by_log = False
-        unit, question = _plausible_unit(name, found.quantity, known)
+        unit, question = plausible_unit(name, found.quantity, known)
         if not unit:
             return _nothing(name, question)
     low, usual, high = map(float, np.quantile(known, [0.0, 0.5, 1.0]))
@@ -380,32 +395,3 @@ def _beyond(quantity: str, unit: str, values: Floats) -> str:
     if outside <= 0.01:
         return ""
     return f"{100.0 * outside:.0f} % of its values are impossible in {unit}; check its unit"
-
-
-def _plausible_unit(name: str, quantity: str, values: Floats) -> tuple[str, str]:
-    """Unit in which values are those of a drive, the usual one first, and a question.
-
-    The unit is empty where they fit none.
-    """
-    q = QUANTITIES[quantity]
-    high = float(np.percentile(np.abs(values), 99.5))
-    if quantity in ("vehicle_speed", "gnss_speed"):
-        if "ego" in name.lower():
-            return "mps", "states no unit; of names with ego it is mps"
-        # Few drives stay below 60 km/h, and none is faster than 60 m/s.
-        unit = "kmh" if high > 45.0 or (quantity == "vehicle_speed" and high > 28.0) else "mps"
-        return unit, f"states no unit; its highest is {high:.3g}, taken as {unit}"
-    if quantity.startswith("gyro_"):
-        unit = "degps" if high > 3.0 else "radps"
-        return unit, f"states no unit; its highest is {high:.3g}, taken as {unit}"
-    if q.suffix == "pct":
-        unit = "ratio" if high <= 1.02 else "pct"
-        return unit, f"states no unit; its highest is {high:.3g}, taken as {unit}"
-    usual = [q.suffix, *(s for s in suffixes_of(q) if s != q.suffix)]
-    low = VACUUM if quantity == "intake_pressure" else q.low
-    for unit in usual:
-        si = to_si(values, unit)
-        if np.mean((si < low) | (si > q.high)) <= 0.01:
-            sure = q.suffix in ("deg", "rpm", "v", "a") and unit == q.suffix
-            return unit, "" if sure else f"states no unit; taken as {unit}"
-    return "", f"not taken for {quantity}: it states no unit, and its values fit none"

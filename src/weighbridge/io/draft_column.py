@@ -27,6 +27,9 @@ _TELLING: Final = frozenset(
 """Words by which a speed is known to be one of the two."""
 
 
+_NULL_ISLAND: Final = 0.01
+"""Positions nearer to 0 are those of a receiver that has none [rad] or [deg]."""
+
 CALCULATED: Final = frozenset(
     ("calc", "calculated", "derived", "computed", "derivative", "berechnet", "abgeleitet",
      "calcule", "calculada", "calcolata")
@@ -89,7 +92,7 @@ def usual_rate(time: Floats) -> float:
 
 def checked(columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, ...]:
     """Say what the columns of one log report each other's units."""
-    columns = gyro_checked(gravity_checked(columns))
+    columns = gyro_checked(gravity_checked(position_checked(columns)))
     return speed_checked(retarder_checked(percent_checked(columns)))
 
 
@@ -105,6 +108,22 @@ def gyro_checked(columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, ...]:
         if c in axes and c is not reported and not c.stated
         else c
         for c in columns
+    )
+
+
+def position_checked(columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, ...]:
+    """Take positions for radians that would lie at sea in degrees: there is no land within 1.57
+    degrees of the equator and 3.15 degrees of Greenwich.
+    """
+    place = {c.quantity: c for c in columns if c.quantity in ("latitude", "longitude")}
+    sizes = {q: max(abs(c.low), abs(c.high)) for q, c in place.items() if not c.stated}
+    if sizes.keys() != {"latitude", "longitude"} or max(sizes.values()) < _NULL_ISLAND:
+        return columns
+    if sizes["latitude"] > np.pi / 2.0 or sizes["longitude"] > np.pi:
+        return columns
+    question = "states no unit; taken as rad, for in degrees it would lie at sea"
+    return tuple(
+        replace(c, unit="rad", question=question) if c in place.values() else c for c in columns
     )
 
 

@@ -8,11 +8,11 @@ from typing import Final
 
 import numpy as np
 
-from weighbridge.io.columns import unit_suffix
+from weighbridge.io.columns import suffixes_of, unit_suffix
 from weighbridge.io.draft_column import DraftColumn
 from weighbridge.io.naming import unit_of
 from weighbridge.io.way import way_ratio
-from weighbridge.signals import Floats
+from weighbridge.signals import QUANTITIES, Floats
 from weighbridge.signals.units import UNITS, to_si
 
 SPEEDS: Final = ("kmh", "mph", "mps", "kn")
@@ -33,6 +33,35 @@ _FEWEST: Final = 10
 
 _PART: Final = 0.95
 """Part of them that lie on it [-]."""
+
+VACUUM: Final = 8_000.0
+"""Pressure in a manifold, at least: engines pull down to some 20 kPa [Pa]."""
+
+_BEYOND: Final = 0.01
+"""Part of the values that may be impossible in a unit: sensors fail now and then [-]."""
+
+_FAST: Final = 10.0
+"""Faster, a vehicle is in one of its highest gears now and then [m/s]."""
+
+_TURNS_PER_METRE: Final = 38.0
+"""Engine speed over vehicle speed in the highest gears: trucks have 50 rpm and more to 1 m/s, and
+cars with a motor and one gear 30 rad/s and less [rpm/(m/s)] or [rad/m]."""
+
+_TOP: Final = 60.0
+"""Speed of a vehicle at most, as `plausible_unit` has it [m/s]."""
+
+_HARDEST: Final = 0.99
+"""Part of the changes of speed that are smaller than the hardest braking [-]."""
+
+_GENTLE: Final = 0.45
+"""Deceleration of a stop at least, in the hardest of a drive: trucks reach 0.8 [m/s^2]."""
+
+_WHILE: Final = 3.0
+"""Time over which a speed changes by more than its steps [s]."""
+
+_ALONG: Final = 0.6
+"""Correlation of these changes with an acceleration, at least: grade is in the one, not in the
+other [-]."""
 
 _ALIKE: Final = 0.98
 """Correlation of two speeds of one vehicle, at least [-]."""
@@ -89,7 +118,77 @@ def with_judged_units(
                 question = f"states no unit; taken as {unit}, for {why}"
                 column = replace(column, unit=unit, question=question)
         judged.append(column)
-    return tuple(judged)
+    return _with_judged_turns(_with_judged_accelerations(tuple(judged), reported), reported)
+
+
+def _with_judged_turns(
+    columns: tuple[DraftColumn, ...], reported: Mapping[str, Values]
+) -> tuple[DraftColumn, ...]:
+    """Give an engine's speed without a stated unit the one that the vehicle's speed shows."""
+    speed = next((c for c in columns if c.quantity in ("vehicle_speed", "gnss_speed")), None)
+    engine = next((c for c in columns if c.quantity == "engine_speed" and not c.stated), None)
+    if speed is None or engine is None:
+        return columns
+    way = reported[speed.name]
+    v, turns = to_si(way.values, speed.unit), reported[engine.name]
+    known = np.isfinite(turns.time + turns.values)
+    if np.count_nonzero(known) < _FEWEST:
+        return columns
+    n = np.interp(way.time, turns.time[known], turns.values[known])
+    fast = np.isfinite(n + v) & (v > _FAST)
+    if np.count_nonzero(fast) < _FEWEST or np.quantile(n[fast] / v[fast], 0.1) > _TURNS_PER_METRE:
+        return columns
+    question = "states no unit; taken as radps, for so few turns to the way are none of an engine"
+    found = replace(engine, unit="radps", question=question)
+    return tuple(found if c is engine else c for c in columns)
+
+
+def _with_judged_accelerations(
+    columns: tuple[DraftColumn, ...], reported: Mapping[str, Values]
+) -> tuple[DraftColumn, ...]:
+    """Give accelerations without a stated unit the one in which one of them is how the speed
+    changes; three axes show theirs by gravity.
+    """
+    axes = [
+        c for c in columns if c.quantity == "longitudinal_accel" or c.quantity.startswith("accel_")
+    ]
+    speed = next((c for c in columns if c.quantity in ("vehicle_speed", "gnss_speed")), None)
+    if speed is None or len(axes) > 2 or any(c.stated for c in axes):
+        return columns
+    values = replace(reported[speed.name], unit=speed.unit)
+    gains = [_gain(values, reported[c.name]) for c in axes]
+    gain = max(gains, key=lambda pair: pair[1], default=(0.0, 0.0))
+    if gain[1] < _ALONG:
+        return columns
+    unit = min(
+        (u for u, other in UNITS.items() if other.dimension == "m/s^2"),
+        key=lambda u: abs(np.log(abs(gain[0]) * UNITS[u].factor)),
+    )
+    question = f"states no unit; taken as {unit}, for {speed.name!r} changes by that"
+    return tuple(replace(c, unit=unit, question=question) if c in axes else c for c in columns)
+
+
+def _gain(speed: Values, accel: Values) -> tuple[float, float]:
+    """Of an acceleration how much there is per change of speed, and how sure that is.
+
+    Returns
+    -------
+    gain : [unit of the acceleration / (m/s^2)]
+    correlation : [-]
+    """
+    known = np.isfinite(accel.time + accel.values)
+    moving = np.isfinite(speed.time + speed.values)
+    t, v = speed.time[moving], to_si(speed.values[moving], speed.unit)
+    if np.count_nonzero(known) < _FEWEST or t.size < _FEWEST:
+        return 0.0, 0.0
+    at, a = accel.time[known], accel.values[known]
+    whole = np.concatenate([[0.0], np.cumsum(0.5 * (a[1:] + a[:-1]) * np.diff(at))])
+    begin = np.arange(max(t[0], at[0]), min(t[-1], at[-1]), _WHILE)
+    change, sum_ = np.diff(np.interp(begin, t, v)), np.diff(np.interp(begin, at, whole))
+    if change.size < _FEWEST or np.ptp(change) == 0.0 or np.ptp(sum_) == 0.0:
+        return 0.0, 0.0
+    gain = float(np.polyfit(change, sum_, 1)[0])
+    return gain, float(abs(np.corrcoef(change, sum_)[0, 1]))
 
 
 def _judged(
@@ -105,7 +204,23 @@ def _judged(
         ratio = _ratio(speed, other)
         if unit := _nearest(ratio):
             return unit, f"{name!r} shows that speed"
-    return _by_steps(speed.values)
+    unit, why = _by_steps(speed.values)
+    return (unit, why) if unit else _by_pace(speed)
+
+
+def _by_pace(speed: Values) -> tuple[str, str]:
+    """Unit of a speed of a vehicle that stops and goes: in another one it would hardly brake."""
+    there = np.isfinite(speed.time + speed.values)
+    time, values = speed.time[there], np.abs(speed.values[there])
+    if values.size < _FEWEST or values.min() > 1.0 or values.max() > _TOP:
+        return "", ""
+    begin = np.arange(time[0], time[-1], _WHILE)
+    changes = np.abs(np.diff(np.interp(begin, time, values))) / _WHILE
+    if changes.size < _FEWEST or not np.quantile(changes, _HARDEST) > 0.0:
+        return "", ""
+    hardest = float(np.quantile(changes, _HARDEST))
+    slow = hardest * UNITS["kmh"].factor < _GENTLE
+    return ("mps", "in km/h it would hardly brake") if slow else ("", "")
 
 
 def _nearest(factor: float) -> str:
@@ -143,3 +258,35 @@ def _by_steps(values: Floats) -> tuple[str, str]:
             if np.mean(np.abs(steps - np.round(steps)) < _WHOLE) >= _PART:
                 return unit, f"its values are whole {whole}"
     return "", ""
+
+
+def plausible_unit(name: str, quantity: str, values: Floats) -> tuple[str, str]:
+    """Unit in which values are those of a drive, the usual one first, and a question.
+
+    The unit is empty where they fit none.
+    """
+    q = QUANTITIES[quantity]
+    high = float(np.percentile(np.abs(values), 99.5))
+    if quantity in ("vehicle_speed", "gnss_speed"):
+        if "ego" in name.lower():
+            return "mps", "states no unit; of names with ego it is mps"
+        # Few drives stay below 60 km/h, and none is faster than 60 m/s.
+        unit = "kmh" if high > 45.0 or (quantity == "vehicle_speed" and high > 28.0) else "mps"
+        return unit, f"states no unit; its highest is {high:.3g}, taken as {unit}"
+    if quantity.startswith("gyro_"):
+        unit = "degps" if high > 3.0 else "radps"
+        return unit, f"states no unit; its highest is {high:.3g}, taken as {unit}"
+    if q.suffix == "pct":
+        unit = "ratio" if high <= 1.02 else "pct"
+        si = to_si(values, unit)
+        if np.mean((si < q.low) | (si > q.high)) > _BEYOND:
+            return "", f"not taken for {quantity}: its highest is {high:.3g}, and it states no unit"
+        return unit, f"states no unit; its highest is {high:.3g}, taken as {unit}"
+    usual = [q.suffix, *(s for s in suffixes_of(q) if s != q.suffix)]
+    low = VACUUM if quantity == "intake_pressure" else q.low
+    for unit in usual:
+        si = to_si(values, unit)
+        if np.mean((si < low) | (si > q.high)) <= _BEYOND:
+            sure = q.suffix in ("deg", "rpm", "v", "a") and unit == q.suffix
+            return unit, "" if sure else f"states no unit; taken as {unit}"
+    return "", f"not taken for {quantity}: it states no unit, and its values fit none"

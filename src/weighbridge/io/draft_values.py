@@ -13,9 +13,10 @@ from typing import Final
 
 import numpy as np
 
+from weighbridge.constants import GRAVITY
 from weighbridge.io.draft_column import DraftColumn
-from weighbridge.io.draft_unit import Values
-from weighbridge.io.naming import means_another
+from weighbridge.io.draft_unit import VACUUM, Values, plausible_unit
+from weighbridge.io.naming import bare_quantities, means_another, words_of
 from weighbridge.signals import QUANTITIES, Floats
 from weighbridge.signals.units import UNITS, to_si
 
@@ -23,14 +24,42 @@ ON_BOARD: Final = 32.0
 """Battery that feeds control units, at most: those of trucks are charged at 29 V, and batteries
 that drive anything have 36 V or more [V]."""
 
-VACUUM: Final = 8_000.0
-"""Pressure in a manifold, at least: engines pull down to some 20 kPa [Pa]."""
-
 _BELOW: Final = 0.2
 """Part of the values of a pressure that may lie below: sensors fail now and then [-]."""
 
+_DEVICE: Final = 6.0
+"""Battery of a telephone or a tracker, at most: those of motorcycles have 6 V or 12 V [V]."""
+
 FOUND: Final = ("vehicle_speed", "engine_speed", "mass_air_flow")
 """Quantities that a unit and the values may show without a name."""
+
+_DRIVEN: Final = frozenset(("engine_torque", "engine_torque_fraction", "engine_power"))
+"""Quantities that change while a vehicle drives."""
+
+ACCEL: Final = ("accel_x", "accel_y", "accel_z")
+
+_NEAR_GRAVITY: Final = 0.15
+"""Part by which the size of an acceleration may differ from gravity in the median [-]."""
+
+_SWITCHES: Final = frozenset(("brake_switch", "clutch_switch"))
+
+_STATES: Final = 4
+"""Values of a switch, at most: J1939 has off, on, error and not available."""
+
+_DROPPED: Final = 0.02
+"""Part of a battery's voltages that may be lower: contactors open [-]."""
+
+_EMPTY: Final = 0.5
+"""Voltage of an empty battery under load over the usual one, at least [-]."""
+
+_SAG: Final = 0.6
+"""Correlation of the changes of a battery's voltage and current, at least [-]."""
+
+_STEP: Final = 3.0
+"""Time over which these changes are taken [s]."""
+
+_BRAKED: Final = 0.3
+"""Deceleration that is none of a coasting vehicle [m/s^2]."""
 
 _FEWEST: Final = 20
 """Rows in which something is to be seen."""
@@ -84,19 +113,35 @@ def with_judged_values(
     reported : what the log holds in numbers, by its names
     """
     columns = tuple(_without_gauge(c, reported) for c in _on_board(columns))
-    for quantity, fits in zip(FOUND, (_moves, _turns, _breathes), strict=True):
-        columns = _found_by_unit(columns, reported, quantity, fits)
+    columns = _without_constants(_without_levels(columns, reported))
+    columns = _with_gravity(columns, reported)
+    for quantity, fits in (
+        *zip(FOUND, (_moves, _turns, _breathes), strict=True),
+        ("battery_voltage", _feeds),
+        ("battery_current", _sags),
+        ("brake_switch", _brakes),
+    ):
+        columns = _found_by_values(columns, reported, quantity, fits)
     return columns
 
 
 def _on_board(columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, ...]:
     """Take a battery that feeds control units for what it is, and its current for nothing."""
-    low = {
-        c.name
+    volts = {
+        c.name: c.usual * UNITS[c.unit].factor
         for c in columns
-        if c.quantity == "battery_voltage" and c.unit and c.usual * UNITS[c.unit].factor < ON_BOARD
+        if c.quantity in ("battery_voltage", "module_voltage") and c.unit
     }
-    if not low:
+    device = {name for name, usual in volts.items() if usual < _DEVICE}
+    columns = tuple(
+        _nothing(c, f"reads {c.usual:.3g} {c.unit}, as the battery of a device")
+        if c.name in device
+        else c
+        for c in columns
+    )
+    named = {c.name for c in columns if c.quantity == "battery_voltage"}
+    low = {name for name in named if volts[name] < ON_BOARD}
+    if not low and not (device and not named):
         return columns
     taken = any(c.quantity == "module_voltage" for c in columns)
     found = []
@@ -126,56 +171,130 @@ def _without_gauge(column: DraftColumn, reported: Mapping[str, Values]) -> Draft
     return _nothing(column, f"goes below {VACUUM / 1000.0:.0f} kPa, to which no engine pulls down")
 
 
+def _without_levels(
+    columns: tuple[DraftColumn, ...], reported: Mapping[str, Values]
+) -> tuple[DraftColumn, ...]:
+    """Take no pressure and no position of a pedal for its switch."""
+    found = []
+    for c in columns:
+        if c.quantity in _SWITCHES and c.name in reported:
+            states = np.unique(reported[c.name].values[np.isfinite(reported[c.name].values)])
+            if states.size > _STATES or states.min() < 0.0 or states.max() >= _STATES:
+                c = _nothing(c, "has more values than a switch")
+        found.append(c)
+    return tuple(found)
+
+
+def _with_gravity(
+    columns: tuple[DraftColumn, ...], reported: Mapping[str, Values]
+) -> tuple[DraftColumn, ...]:
+    """Take three columns that gravity is in for a sensor's: ROS calls them linear, others G-X."""
+    axes = [
+        next((c for c in columns if not c.quantity and q in bare_quantities(c.name)), None)
+        for q in ACCEL
+    ]
+    if any(c is None for c in axes) or any(c.quantity in ACCEL for c in columns):
+        return columns
+    three = {c.name: q for c, q in zip(axes, ACCEL, strict=True) if c is not None}
+    values = {name: reported[name] for name in three if name in reported}
+    # One that is called linear reads 1 m/s^2 without gravity.
+    linear = any("linear" in words_of(name) for name in three)
+    units = ("mps2",) if linear else ("g", "mps2", "mg")
+    if len(values) < len(ACCEL) or any(v.unit not in ("", *units) for v in values.values()):
+        return columns
+    size = float(np.nanmedian(np.linalg.norm([v.values for v in values.values()], axis=0)))
+    near = [u for u in units if abs(size * UNITS[u].factor / GRAVITY - 1.0) < _NEAR_GRAVITY]
+    if not near:
+        return columns
+    return tuple(
+        _taken(c, three[c.name], replace(values[c.name], unit=near[0]), "has gravity in it")
+        if c.name in three
+        else c
+        for c in columns
+    )
+
+
+def _without_constants(columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, ...]:
+    """Take no constant, such as an engine's rated power, for what changes in a drive."""
+    drives = any(
+        c.quantity in ("vehicle_speed", "gnss_speed")
+        and (c.high - c.low) * UNITS[c.unit].factor > _SLOW
+        for c in columns
+    )
+    return tuple(
+        _nothing(c, "hardly changes while the vehicle drives")
+        if drives and c.quantity in _DRIVEN and c.low >= _EMPTY * c.high and c.count >= _FEWEST
+        else c
+        for c in columns
+    )
+
+
 def _nothing(column: DraftColumn, why: str) -> DraftColumn:
     """Take a column for nothing, and say why."""
     question = f"not taken for {column.quantity}: it {why}"
     return replace(column, quantity="", unit="", stated=False, question=question, unsure=False)
 
 
-def _found_by_unit(
+def _found_by_values(
     columns: tuple[DraftColumn, ...],
     reported: Mapping[str, Values],
     quantity: str,
     fits: Callable[[Values, Mapping[str, Values]], bool],
 ) -> tuple[DraftColumn, ...]:
-    """Take the one column with a quantity's unit whose values move as that quantity does.
+    """Take the one column whose values move as a quantity does, by its unit or a name that only
+    says in what it is measured.
 
     Columns that read alike are one: the first is taken.
     """
     taken = {c.quantity for c in columns}
     if quantity in taken or (quantity == "vehicle_speed" and "gnss_speed" in taken):
         return columns
-    dimension = UNITS[QUANTITIES[quantity].suffix].dimension
-    known = {c.quantity: reported[c.name] for c in columns if c.quantity and c.name in reported}
-    fitting = [
-        c
+    suffix = QUANTITIES[quantity].suffix
+    dimension = UNITS[suffix or "ratio"].dimension
+    known = {
+        c.quantity: replace(reported[c.name], unit=c.unit)
         for c in columns
-        if not c.quantity
-        and c.name in reported
-        and reported[c.name].unit in UNITS
-        and UNITS[reported[c.name].unit].dimension == dimension
-        and not means_another(c.name, quantity)
-        and fits(reported[c.name], known)
-    ]
-    if not fitting or not _alike([reported[c.name] for c in fitting]):
+        if c.quantity and c.unit and c.name in reported
+    }
+    fitting: list[tuple[DraftColumn, Values]] = []
+    for c in columns:
+        if c.quantity or c.name not in reported:
+            continue
+        values, bare = reported[c.name], quantity in bare_quantities(c.name)
+        if not suffix:
+            values = replace(values, unit="ratio")
+        if bare and suffix and not values.unit and np.any(np.isfinite(values.values)):
+            finite = values.values[np.isfinite(values.values)]
+            values = replace(values, unit=plausible_unit(c.name, quantity, finite)[0])
+        by_unit = values.unit in UNITS and UNITS[values.unit].dimension == dimension
+        named = bare or (quantity in FOUND and not means_another(c.name, quantity))
+        if by_unit and named and fits(values, known):
+            fitting.append((c, values))
+    if not fitting or not _alike([values for _, values in fitting]):
         return columns
-    values = reported[fitting[0].name]
+    taken_for, values = fitting[0]
+    found = _taken(taken_for, quantity, values, "its name does not tell, but how it moves does")
+    found = replace(found, stated=bool(reported[taken_for.name].unit))
+    return tuple(found if c is taken_for else c for c in columns)
+
+
+def _taken(column: DraftColumn, quantity: str, values: Values, why: str) -> DraftColumn:
+    """Take a column that was nothing for a quantity."""
     there = values.values[np.isfinite(values.values)]
     low, usual, high = map(float, np.quantile(there, (0.0, 0.5, 1.0)))
-    found = replace(
-        fitting[0],
+    return replace(
+        column,
         quantity=quantity,
-        unit=values.unit,
-        stated=True,
+        unit=values.unit if QUANTITIES[quantity].suffix else "",
+        stated=False,
         low=low,
         usual=usual,
         high=high,
         count=int(there.size),
         rows=np.isfinite(values.values),
-        question=f"its name is not known; taken for {quantity} by its unit and by how it moves",
+        question=f"taken for {quantity}: {why}",
         unsure=True,
     )
-    return tuple(found if c is fitting[0] else c for c in columns)
 
 
 def _alike(several: Sequence[Values]) -> bool:
@@ -269,6 +388,48 @@ def _breathes(values: Values, known: Mapping[str, Values]) -> bool:
     if np.ptp(flow[both]) == 0.0 or np.ptp(n[both]) == 0.0:
         return False
     return float(np.corrcoef(flow[both], n[both])[0, 1]) > _TOGETHER
+
+
+def _feeds(values: Values, known: Mapping[str, Values]) -> bool:
+    """Whether a voltage is that of a battery that drives the vehicle."""
+    _, volts = _rising(values)
+    q = QUANTITIES["battery_voltage"]
+    if volts.size < _FEWEST or volts.max() > q.high:
+        return False
+    lowest, usual = np.quantile(volts, (_DROPPED, 0.5))
+    return bool(usual >= ON_BOARD and lowest > _EMPTY * usual)
+
+
+def _sags(values: Values, known: Mapping[str, Values]) -> bool:
+    """Whether a battery's voltage falls and rises with a current, by its resistance."""
+    battery = known.get("battery_voltage")
+    if battery is None:
+        return False
+    time, volts = _rising(battery)
+    amps, later = _at(values, time), np.searchsorted(time, time + _STEP)
+    first = np.flatnonzero(later < time.size)
+    changes = [x[later[first]] - x[first] for x in (volts, amps)]
+    both = np.isfinite(changes[0] + changes[1])
+    a, b = (x[both] for x in changes)
+    if a.size < _FEWEST or np.ptp(a) == 0.0 or np.ptp(b) == 0.0:
+        return False
+    return bool(abs(np.corrcoef(a, b)[0, 1]) > _SAG)
+
+
+def _brakes(values: Values, known: Mapping[str, Values]) -> bool:
+    """Whether the vehicle slows down while a switch is on, and not while it is off."""
+    speed = known.get("vehicle_speed") or known.get("gnss_speed")
+    states = np.unique(values.values[np.isfinite(values.values)])
+    if speed is None or states.size != 2 or states.tolist() != [0.0, 1.0]:
+        return False
+    time, v = _rising(speed)
+    later = np.searchsorted(time, time + _STEP)
+    first = np.flatnonzero((later < time.size) & (v > _SLOW))
+    slowing = (v[later[first]] - v[first]) / (time[later[first]] - time[first])
+    on = _at(values, time[first]) > 0.5
+    if min(np.count_nonzero(on), np.count_nonzero(~on)) < _FEWEST:
+        return False
+    return float(np.median(slowing[on])) < -_BRAKED < float(np.median(slowing[~on]))
 
 
 def _rising(values: Values) -> tuple[Floats, Floats]:

@@ -564,7 +564,8 @@ def _busmaster_head(path: Path, block: bytes) -> tuple[int, Form]:
 
 _NAMES: Final[Mapping[str, frozenset[str]]] = {
     "time": frozenset(
-        ("time", "timestamp", "time stamp", "abs time", "time s", "abs time sec", "time sec",
+        ("time", "timestamp", "time stamp", "abs time", "time abs", "time s", "abs time sec",
+         "time sec",
          "absolute time", "timestampepoch")
     ),
     "id": frozenset(
