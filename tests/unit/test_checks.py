@@ -375,15 +375,6 @@ def test_barometer_in_another_unit(sane, factor, unit, said):
     assert found.values["remedy"] == remedy
 
 
-def test_percent_under_newton_metres_is_a_note(sane):
-    t = np.arange(0.0, 900.0, 0.5)
-    values = np.round(40.0 + 45.0 * np.sin(t / 7.0))
-    found = check_drive(sane.with_signals(Signal("engine_torque", t, values)))
-    assert [p.id for p in found if p.signal == "engine_torque"] == ["torque.whole_percent"]
-    finer = Signal("engine_torque", t, values + 0.25)
-    assert check_drive(sane.with_signals(finer)) == ()
-
-
 def test_newton_metres_under_percent(sane):
     t = np.arange(0.0, 900.0, 0.5)
     wrong = Signal("engine_torque_fraction", t, 0.01 * (120.0 + 100.0 * np.sin(t / 7.0)))

@@ -20,7 +20,6 @@ from weighbridge.checks.engine import (
     check_friction,
     check_idle,
     check_torque_sign,
-    check_whole_torque,
 )
 from weighbridge.checks.frozen_imu import check_frozen, check_limit
 from weighbridge.checks.inertial import check_imu
@@ -52,7 +51,6 @@ _CHECKS: Final[tuple[_Check, ...]] = (
     check_load,
     check_pressure,
     check_retarder,
-    check_whole_torque,
     check_torque_sign,
     check_friction,
     check_engine_speed,
