@@ -117,7 +117,7 @@ NAMED: Final[tuple[tuple[Callable[..., Any], dict[str, str]], ...]] = (
         "checks.second_signals": "check_reading check_second_signals compared",
         "checks.steps": "check_steps",
         "checks.inertial": "_check_parts _check_gravity _check_rate _check_axes",
-        "checks.speed": "_check_alone _check_positions _check_altitude",
+        "checks.speed": "_check_alone _check_positions",
         "checks.vehicle": "_check_reference _check_gears",
         "navigation.clock_drift": "_lost",
         "pipeline.notes": "unbacked other_equipment beside_speed overload beyond_class below_tare "
@@ -125,7 +125,7 @@ NAMED: Final[tuple[tuple[Callable[..., Any], dict[str, str]], ...]] = (
     }),
     (_none, {
         "checks.inertial": "_not_about_vertical _against_course _against_speed",
-        "checks.speed": "_usual_gearing _gear_ratio _accel_ratio _grade_ratio _beyond_belief",
+        "checks.speed": "_usual_gearing _gear_ratio _accel_ratio _beyond_belief",
         "balance.bandwidth": "smoothed_torque",
         "balance.shaking": "shaken",
         "balance.gear_scale": "scale_contradiction _changing",

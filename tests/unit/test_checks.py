@@ -268,42 +268,6 @@ def test_latitude_and_longitude_swapped(sane):
     assert turned.id == "position.swapped"
 
 
-def test_altitude_in_feet_by_the_steepness_of_the_road(sane):
-    # The made road has grades up to 3 %; these are of a mountain road.
-    s = sane.signals["altitude"]
-    steep = replace(s, values=s.values.mean() + 3.0 * (s.values - s.values.mean()))
-    assert check_drive(sane.with_signals(steep)) == ()
-    feet = sane.with_signals(replace(steep, values=steep.values / 0.3048))
-    (note,) = check_drive(feet)
-    assert not note.serious
-    assert note.id == "altitude.steep"
-    assert only(feet.without(*ACCEL, *GYRO)).id.startswith("altitude.")
-
-
-def test_altitude_in_feet_by_the_accelerometer():
-    rng = np.random.default_rng(5)
-    t = np.arange(0.0, 1800.0, 0.1)
-    v = 15.0 + 5.0 * np.sin(t / 9.0)
-    grade = 0.03 * np.sin(t / 41.0)
-    force = np.gradient(v, t) + 9.81 * grade + 0.2 + rng.normal(0.0, 0.1, t.size)
-    signals = {
-        "vehicle_speed": v,
-        "longitudinal_accel": force,
-        "altitude": np.round(500.0 + np.cumsum(v * grade) * 0.1),
-    }
-    drive = Drive("e", {n: Signal(n, t, x) for n, x in signals.items()})
-    assert check_drive(drive) == ()
-    (note,) = check_drive(scaled(drive, altitude=1 / 0.3048))
-    assert note.id == "altitude.feet"
-    assert note.values["remedy"] == phrase("altitude_feet")
-    # What is declared to be in feet is in no need of that advice.
-    declared = replace(scaled(drive, altitude=1 / 0.3048), units={"altitude": "ft"})
-    (other,) = check_drive(declared)
-    factor = 1.0 / other.values["ratio"]
-    assert factor == pytest.approx(0.305, rel=0.05)
-    assert other.values["remedy"] == phrase("altitude_factor", unit="ft", factor=factor)
-
-
 def test_load_as_a_part_of_one(sane):
     problem = only(scaled(sane, engine_load=0.01))
     assert (problem.id, problem.values["column"]) == ("range.ratio", "engine_load")
