@@ -129,7 +129,7 @@ NAMED: Final[tuple[tuple[Callable[..., Any], dict[str, str]], ...]] = (
         "balance.bandwidth": "smoothed_torque",
         "balance.shaking": "shaken",
         "balance.gear_scale": "scale_contradiction _changing",
-        "balance.gear_fit": "foreign_part share_on_gears",
+        "balance.gear_fit": "share_on_gears",
         "balance.filled": "identify_fill",
         "balance.floor": "find_floor",
         "balance.disagreement": "_change",

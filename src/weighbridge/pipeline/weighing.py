@@ -20,7 +20,7 @@ from weighbridge.balance.delay import (
     estimate_torque_delay,
     far_shift,
 )
-from weighbridge.balance.gear_fit import ENOUGH, foreign_part, ratio_apart, share_on_gears
+from weighbridge.balance.gear_fit import ENOUGH, ratio_apart, share_on_gears
 from weighbridge.balance.gear_scale import scale_contradiction
 from weighbridge.balance.hybrid import motor_helps
 from weighbridge.balance.shaking import shaken
@@ -309,7 +309,6 @@ def weigh_balance(
     elif not estimator.speed_alone and (
         why := motor_helps(drive, balance, vehicle)
         or scale_contradiction(balance, vehicle)
-        or foreign_part(balance, vehicle)
         or shaken(drive, balance.motion)
         or _smoothed(drive, vehicle, result)
     ):
