@@ -27,9 +27,6 @@ _ZEROS: Final = 0.002
 _MORE: Final = 4.0
 """if there are so many times more of them than of the values beside them [-]."""
 
-_REPEATS: Final = 0.3
-"""With a larger part of repeated samples in motion the sensor is slower than its table [-]."""
-
 _AT_LIMIT: Final = (5e-4, 0.3)
 """Part of the samples at an axis's highest or lowest value at which it is a limit [-]: with more
 than the larger part it is the axis of gravity, whose limit does not matter."""
@@ -92,27 +89,6 @@ def rare_spikes(x: Floats, kind: str) -> Bools:
     found = _spikes(x, _LEAST_SPIKE[kind == "gyro"])
     few = np.count_nonzero(found) <= _RARE * x.size
     return found if few else np.zeros(x.size, dtype=bool)
-
-
-def repeated_rows(accel: Axes, gyro: Axes, moving: Bools) -> Bools:
-    """Mark samples in motion that a slower sensor only repeats; none where few are alike.
-
-    Parameters
-    ----------
-    accel, gyro
-    moving : (n,) the vehicle moves
-
-    Returns
-    -------
-    (n,)
-    """
-    same = moving.copy()
-    same[:1] = False
-    for x in (*accel.columns, *gyro.columns):
-        same[1:] &= x[1:] == x[:-1]
-    if np.count_nonzero(same) < _REPEATS * np.count_nonzero(moving):
-        same[:] = False
-    return same
 
 
 def _spikes(x: Floats, least: float) -> Bools:
