@@ -80,13 +80,6 @@ _SMOOTHED: Final = 1.7
 """A scale is off by as much over `_SHORT` as over `_LONG` [s], 0.9 to 1.3 times in four vehicles; a
 speed that is smoothed over 0.7 to 3 s by 2.0 to 3.4 times."""
 
-_ALIKE: Final = 2.0
-"""Mean squared errors before and after a change of the scale differ by less [-]: by up to 1.5 in
-simulated drives with such a change, by 2.6 where an axis of the gyro was reversed."""
-
-_SMALL: Final = 0.07
-"""Errors of so much are small, whatever their ratio [m/s]."""
-
 _CHANGE_SURE: Final = 25.0
 """Squared error that a change of the scale must explain, over its variance [-]."""
 
@@ -205,8 +198,6 @@ def find_gain(
     least = _LEFT if again else max(_LEAST, (_SURE_TWICE if upheld else _SURE) * std)
     if float(np.average(off, weights=weight)) < least + noise or float(np.max(off)) > _MOST:
         return None
-    if curve[0] != curve[1] and _rougher(time, error, ends):
-        return None
     if again or upheld:
         return found
     if _smoothed(motion, speed):
@@ -241,17 +232,6 @@ def _smoothed(motion: Motion, speed: Signal) -> bool:
         _, force, shown = pairs
         off.append(abs(float(force @ force / (force @ shown)) - 1.0))
     return off[0] > _SMOOTHED * off[1]
-
-
-def _rougher(time: Floats, error: Floats, ends: Floats) -> bool:
-    """Say whether speed and force also fit worse after a change: then it is not the scale."""
-    middle = 0.5 * (ends[0] + ends[1])
-    # Blocks do not show the instant: next to it the fit may be wrong.
-    before, after = error[time < middle - _BLOCK], error[time > middle + _BLOCK]
-    if not before.size or not after.size:
-        return True
-    ratio = (float(np.mean(after)) + _SMALL**2) / (float(np.mean(before)) + _SMALL**2)
-    return not 1.0 / _ALIKE < ratio < _ALIKE
 
 
 def changes_of_speed(
