@@ -200,10 +200,9 @@ NAMED: Final[tuple[tuple[Callable[..., Any], dict[str, str]], ...]] = (
     (_false, {
         "checks.false_samples": "isolated piled clipped",
         "checks.frozen": "frozen",
-        "checks.second_signals": "_outvoted",
         "checks.steps": "_cleared",
-        "navigation.dropouts": "false_rows rare_spikes repeated_rows _spikes _zeros _clipped",
-        "navigation.identify.gain": "_upheld _smoothed _rougher",
+        "navigation.dropouts": "false_rows rare_spikes _spikes _zeros _clipped",
+        "navigation.identify.gain": "_upheld _smoothed",
         "balance.cornering": "cornering",
         "balance.filled": "filled",
         "balance.foot": "_pressed _noisy",

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -72,7 +71,7 @@ def check_second_signals(
     agree = [
         f.signal for f in found if f.verdict == "agrees" and abs(f.scale - 1.0) <= QUESTIONABLE
     ]
-    if agree and not _outvoted(off):
+    if agree:
         return tuple(_second_signal_off(reading, f, agree) for f in off)
     if not off:
         return ()
@@ -91,12 +90,6 @@ def _without_frozen(drive: Drive, vehicle: Vehicle) -> Drive:
             kept = Signal(name, signal.time[~marked], signal.values[~marked])
             drive = drive.with_signals(kept)
     return drive
-
-
-def _outvoted(off: Sequence[Finding]) -> bool:
-    """Say whether two second signals are off by the same: then it is the reading."""
-    scales = sorted(f.scale for f in off if f.scaled and f.blur == 0.0 and not _part(f))
-    return any(b - a < QUESTIONABLE for a, b in pairwise(scales))
 
 
 def _reading_off(
