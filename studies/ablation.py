@@ -173,7 +173,7 @@ NAMED: Final[tuple[tuple[Callable[..., Any], dict[str, str]], ...]] = (
         "estimators.squat": "of_vehicle",
         "estimators.joint.changing": "_without_launches",
         "estimators.joint.switched": "without_switched",
-        "navigation.clock_drift": "correct_clocks _narrowed _median_of_three",
+        "navigation.clock_drift": "correct_clocks _narrowed",
         "navigation.identify.remounting": "undo",
         "calibration.joint": "_with_dragged _without",
         "balance.foot": "unsmoothed",

@@ -21,7 +21,7 @@ from weighbridge.navigation.clock_lag import (
 from weighbridge.navigation.frozen import without_frozen
 from weighbridge.signals import QUANTITIES, Bools, Drive, Floats, Problem, Signal
 from weighbridge.signals.instants import instant, span
-from weighbridge.signals.robust import huber, spread
+from weighbridge.signals.robust import huber, median_of_three, median_slope, spread
 from weighbridge.signals.runs import marked_runs
 
 _LOG = logging.getLogger(__name__)
@@ -202,7 +202,7 @@ def _judged(lags: Lags, table: str) -> _Path | Problem | None:
     length = float(time[-1] - time[0])
     drifts = abs(slope) * length > _DRIFT and abs(slope) > _SURE * slope_std
     allowed = _WANDER + 4.0 * scatter
-    wanders = float(np.ptp(_median_of_three(lag))) > allowed
+    wanders = float(np.ptp(median_of_three(lag))) > allowed
     apart = not _OWN[0] < float(np.median(lag)) < _OWN[1]
     if not (drifts or wanders or apart):
         return None
@@ -212,7 +212,7 @@ def _judged(lags: Lags, table: str) -> _Path | Problem | None:
     # In a piece of a clock that drifts fast the lag is less sure; the next round sees to the rest.
     more = _BLUR * abs(slope)
     follows = float(np.mean(np.abs(lag - fit) < _NEAR + more)) >= _FOLLOWS
-    if follows and np.ptp(_median_of_three(lag - fit)) <= allowed + 2.0 * more:
+    if follows and np.ptp(median_of_three(lag - fit)) <= allowed + 2.0 * more:
         slope = slope if drifts else 0.0
         knots = time[[0, -1]]
         text = phrase("clock_drifts", slope=1e6 * slope) if drifts else ""
@@ -245,7 +245,7 @@ def _lost(lags: Lags) -> tuple[tuple[float, float], ...]:
 
 def _broken(time: Floats, lag: Floats, table: str) -> _Path | Problem | None:
     """Follow a lag that changes by steps, or slowly but not evenly."""
-    level_lag = _median_of_three(lag)
+    level_lag = median_of_three(lag)
     jumps = np.flatnonzero(np.abs(np.diff(level_lag)) > _STEP)
     # One step shows as two or three where a piece holds both sides of it.
     groups = np.split(jumps, np.flatnonzero(np.diff(jumps) > 2) + 1) if jumps.size else []
@@ -261,7 +261,7 @@ def _broken(time: Floats, lag: Floats, table: str) -> _Path | Problem | None:
     time, lag = time[~blended], lag[~blended]
     ends = [float(b) for _, b in cuts]
     parts = np.split(np.arange(lag.size), np.searchsorted(time, ends))
-    level = np.concatenate([_median_of_three(lag[p]) for p in parts])
+    level = np.concatenate([median_of_three(lag[p]) for p in parts])
     follows = np.count_nonzero(np.abs(lag - level) < _NEAR) + np.count_nonzero(blended)
     if len(cuts) > _MOST_STEPS or follows < _FOLLOWS * blended.size:
         return _hopeless(table, phrase("clocks_jump")) if table == "obd" else None
@@ -315,8 +315,7 @@ def _speeds_agree(drive: Drive, when: tuple[tuple[float, float], ...]) -> bool |
 def _line(time: Floats, lag: Floats, scatter: float) -> tuple[float, float, Floats]:
     """Robust line: slope, its standard deviation, and its values (k,)."""
     t = time - time.mean()
-    i, j = np.triu_indices(t.size, 1)
-    slope = float(np.median((lag[j] - lag[i]) / (t[j] - t[i])))
+    slope = median_slope(t, lag)
     middle = float(np.median(lag - slope * t))
     weight = np.ones(t.size)
     for _ in range(20):
@@ -328,13 +327,6 @@ def _line(time: Floats, lag: Floats, scatter: float) -> tuple[float, float, Floa
         middle = float(np.sum((lag - slope * t) * weight) / total)
     std = scatter * float(np.sqrt(_OVERLAP / max(np.sum(weight * t**2), 1e-9)))
     return slope, std, middle + slope * t
-
-
-def _median_of_three(y: Floats) -> Floats:
-    if y.size < 3:
-        return y
-    padded = np.concatenate((y[:1], y, y[-1:]))
-    return np.asarray(np.median([padded[:-2], padded[1:-1], padded[2:]], axis=0))
 
 
 def _lone(lag: Floats) -> Bools:

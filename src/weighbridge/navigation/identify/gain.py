@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
-from weighbridge.constants import GRAVITY, SAMPLES_AT_ONCE
+from weighbridge.constants import GRAVITY, INDEPENDENT, SAMPLES_AT_ONCE
 from weighbridge.navigation.axes import Axes
 from weighbridge.navigation.identify.steps import fitted
 from weighbridge.navigation.motion import Motion
@@ -30,8 +30,6 @@ _LEVEL: Final = 30.0
 _SLOW: Final = 1.0
 """Slower, wheels do not show their speed [m/s]."""
 
-_BLOCK: Final = 60.0
-"""Blocks show how the scale scatters and changes [s]."""
 
 _FEWEST: Final = 5
 """Fewer blocks show no scale."""
@@ -139,7 +137,7 @@ def _starts(time: Floats) -> NDArray[np.intp]:
     """First sample of each block of a minute that has any; looks at a part after another."""
     found = [np.zeros(1, dtype=np.intp)]
     for first in range(0, time.size, SAMPLES_AT_ONCE):
-        block = np.floor((time[first : first + SAMPLES_AT_ONCE + 1] - time[0]) / _BLOCK)
+        block = np.floor((time[first : first + SAMPLES_AT_ONCE + 1] - time[0]) / INDEPENDENT)
         found.append(first + 1 + np.flatnonzero(np.diff(block)))
     return np.concatenate(found)
 
@@ -167,7 +165,7 @@ def find_gain(
     if pairs is None:
         return None
     time, force, shown = pairs
-    block = ((time - time[0]) / _BLOCK).astype(np.int64)
+    block = ((time - time[0]) / INDEPENDENT).astype(np.int64)
     square = np.bincount(block, force**2)
     common = np.bincount(block, force * shown)
     strong = square > 0.05 * float(np.max(square))
