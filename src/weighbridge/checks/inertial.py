@@ -16,7 +16,6 @@ import numpy as np
 from weighbridge.checks import windows
 from weighbridge.constants import GRAVITY
 from weighbridge.messages import phrase
-from weighbridge.navigation.dropouts import rare_spikes
 from weighbridge.navigation.frozen import without_frozen
 from weighbridge.signals import Bools, Drive, Floats, Problem, Signal
 from weighbridge.signals.catalogue import IMU_SIGNALS
@@ -54,7 +53,7 @@ _PART: Final = 300.0
 
 def check_imu(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
     """Compare the inertial sensor with gravity, with the course and with itself."""
-    drive = _without_spikes(without_frozen(drive, IMU_SIGNALS))
+    drive = without_frozen(drive, IMU_SIGNALS)
     accel = _axes(drive, "accel")
     gyro = _axes(drive, "gyro")
     if gyro is not None and not any(np.ptp(s.values) > 0.0 for s in gyro):
@@ -72,17 +71,6 @@ def check_imu(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
         return
     found = list(_check_axes(drive, accel, gyro))
     yield from found or _check_parts(drive)
-
-
-def _without_spikes(drive: Drive) -> Drive:
-    """Leave out what navigation leaves out too: a few false samples are no other unit."""
-    kept = []
-    for name in IMU_SIGNALS:
-        s = drive.get(name)
-        if s is None or not (false := rare_spikes(s.values, name.partition("_")[0])).any():
-            continue
-        kept.append(Signal(name, s.time[~false], s.values[~false]))
-    return drive.with_signals(*kept) if kept else drive
 
 
 def _check_parts(drive: Drive) -> Iterator[Problem]:

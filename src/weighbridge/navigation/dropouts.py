@@ -37,9 +37,6 @@ _CLIPPED: Final = 0.1
 _WINDOW: Final = 1.0
 """over so long [s]."""
 
-_RARE: Final = 0.03
-"""Spikes are no larger part of the samples [-]."""
-
 
 def false_rows(accel: Axes, gyro: Axes, moving: Bools, period: float) -> Bools:
     """Mark samples that say nothing of the motion.
@@ -72,23 +69,6 @@ def false_rows(accel: Axes, gyro: Axes, moving: Bools, period: float) -> Bools:
         for x in (*accel.columns, *gyro.columns):
             false[good] |= _clipped(x if good.all() else x[good], round(_WINDOW / period))
     return np.asarray(false)
-
-
-def rare_spikes(x: Floats, kind: str) -> Bools:
-    """Mark single samples of one axis that leap away and return at once, where they are few.
-
-    Parameters
-    ----------
-    x : (n,) force [m/s^2] or rate [rad/s]
-    kind : ``accel`` or ``gyro``
-
-    Returns
-    -------
-    (n,) all False where they are more than `_RARE`: that is noise
-    """
-    found = _spikes(x, _LEAST_SPIKE[kind == "gyro"])
-    few = np.count_nonzero(found) <= _RARE * x.size
-    return found if few else np.zeros(x.size, dtype=bool)
 
 
 def _spikes(x: Floats, least: float) -> Bools:
