@@ -200,7 +200,7 @@ NAMED: Final[tuple[tuple[Callable[..., Any], dict[str, str]], ...]] = (
         "checks.false_samples": "isolated piled clipped",
         "checks.frozen": "frozen",
         "checks.steps": "_cleared",
-        "navigation.dropouts": "false_rows _spikes _zeros _clipped",
+        "navigation.dropouts": "false_rows _spikes _zeros",
         "navigation.identify.gain": "_upheld _smoothed",
         "balance.cornering": "cornering",
         "balance.filled": "filled",

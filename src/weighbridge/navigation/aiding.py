@@ -115,7 +115,7 @@ def read_imu(drive: Drive) -> Imu:
     imu = Imu(time, accel, gyro, usual)
     if imu.period > _SLOWEST:
         raise refused("imu.slow", drive=drive.name, period=imu.period)
-    false = false_rows(imu.accel, imu.gyro, moving, imu.period)
+    false = false_rows(imu.accel, imu.gyro, moving)
     if not false.any() or time[-1] - time[0] < _BRIEF:
         return imu
     if np.count_nonzero(~false) < _FEWEST:

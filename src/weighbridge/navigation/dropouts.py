@@ -1,11 +1,10 @@
-"""Inertial samples that cannot be: zeros in place of a reading, spikes, an axis at its limit."""
+"""Inertial samples that cannot be: zeros in place of a reading, spikes."""
 
 from __future__ import annotations
 
 from typing import Final
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
 
 from weighbridge.constants import GRAVITY
 from weighbridge.navigation.axes import Axes
@@ -27,25 +26,14 @@ _ZEROS: Final = 0.002
 _MORE: Final = 4.0
 """if there are so many times more of them than of the values beside them [-]."""
 
-_AT_LIMIT: Final = (5e-4, 0.3)
-"""Part of the samples at an axis's highest or lowest value at which it is a limit [-]: with more
-than the larger part it is the axis of gravity, whose limit does not matter."""
 
-_CLIPPED: Final = 0.1
-"""A larger part of samples at the limit leaves no mean [-],"""
-
-_WINDOW: Final = 1.0
-"""over so long [s]."""
-
-
-def false_rows(accel: Axes, gyro: Axes, moving: Bools, period: float) -> Bools:
+def false_rows(accel: Axes, gyro: Axes, moving: Bools) -> Bools:
     """Mark samples that say nothing of the motion.
 
     Parameters
     ----------
     accel, gyro : specific force [m/s^2] and rate [rad/s]
     moving : (n,) the vehicle moves
-    period : of the samples [s]
 
     Returns
     -------
@@ -63,11 +51,6 @@ def false_rows(accel: Axes, gyro: Axes, moving: Bools, period: float) -> Bools:
     for kind, block in enumerate((accel, gyro)):
         for x in block.columns:
             false |= _spikes(x, _LEAST_SPIKE[kind]) | _zeros(x, moving)
-    # What has no reading must not pass for the lowest one.
-    good = ~false
-    if good.any():
-        for x in (*accel.columns, *gyro.columns):
-            false[good] |= _clipped(x if good.all() else x[good], round(_WINDOW / period))
     return np.asarray(false)
 
 
@@ -105,18 +88,3 @@ def _zeros(x: Floats, moving: Bools) -> Bools:
         return np.zeros(x.size, dtype=bool)
     near = int(np.count_nonzero((x >= low) & (x <= high) & moving)) - here
     return zero if here > _MORE * max(near, 1) / 10.0 else np.zeros(x.size, dtype=bool)
-
-
-def _clipped(x: Floats, width: int) -> Bools:
-    width = max(width, 3)
-    lost = np.zeros(x.size, dtype=bool)
-    for limit in (float(x.max()), float(x.min())):
-        at = x == limit
-        count = int(np.count_nonzero(at))
-        if not _AT_LIMIT[0] * x.size < count < _AT_LIMIT[1] * x.size or count <= _CLIPPED * width:
-            continue
-        inner = 0.98 * limit if abs(limit) > 0.0 else 0.0
-        near = int(np.count_nonzero((x > min(inner, limit)) & (x < max(inner, limit))))
-        if count > _MORE * near:
-            lost |= uniform_filter1d(at.astype(np.float64), width) > _CLIPPED
-    return lost
