@@ -323,22 +323,6 @@ def test_load_in_percent_under_a_ratio(sane):
     assert (found.values["low"], found.values["high"]) == ("0 pct", "102 pct")
 
 
-@pytest.mark.parametrize(
-    ("factor", "unit", "said"),
-    [(10.0, "hpa", "kpa"), (0.1, "kpa", "hpa"), (1e3, "pa", "kpa"), (0.0, "", "")],
-)
-def test_barometer_in_another_unit(sane, factor, unit, said):
-    t = np.arange(0.0, 900.0, 10.0)
-    values = np.full(t.size, 95e3)
-    assert serious(sane.with_signals(Signal("barometric_pressure", t, values))) == []
-    wrong = Signal("barometric_pressure", t, values * factor)
-    found = only(sane.with_signals(wrong))
-    assert found.id == "range.pressure"
-    named = {"unit": unit, "said": said, "column": "barometric_pressure"}
-    remedy = phrase("pressure_unit", **named) if unit else phrase("pressure_check")
-    assert found.values["remedy"] == remedy
-
-
 def test_newton_metres_under_percent(sane):
     t = np.arange(0.0, 900.0, 0.5)
     wrong = Signal("engine_torque_fraction", t, 0.01 * (120.0 + 100.0 * np.sin(t / 7.0)))

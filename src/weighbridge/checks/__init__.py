@@ -29,7 +29,7 @@ from weighbridge.checks.smoothed_imu import check_smoothed, without_smoothed
 from weighbridge.checks.speed import check_scales
 from weighbridge.checks.spikes import without_spikes
 from weighbridge.checks.travel import check_sign, check_standstill
-from weighbridge.checks.values import check_load, check_pressure, check_retarder, check_stuck
+from weighbridge.checks.values import check_load, check_retarder, check_stuck
 from weighbridge.checks.vehicle import check_vehicle
 from weighbridge.navigation.along import with_forward_accel
 from weighbridge.navigation.clock_drift import correct_clocks
@@ -48,7 +48,6 @@ _CHECKS: Final[tuple[_Check, ...]] = (
     check_frozen,
     check_smoothed,
     check_load,
-    check_pressure,
     check_retarder,
     check_torque_sign,
     check_friction,
