@@ -208,7 +208,7 @@ NAMED: Final[tuple[tuple[Callable[..., Any], dict[str, str]], ...]] = (
         "balance.disagreement": "_smoothed",
         "estimators.joint.load_stops": "too_hasty",
         "estimators.judging": "lacks_accelerometer",
-        "navigation.clock_drift": "_strangers _lone",
+        "navigation.clock_drift": "_lone",
         "navigation.identify.remounting": "_seen_by_gyro",
         "balance.braking": "_misses _braked _trailing retarder_untold",
     }),

@@ -40,10 +40,6 @@ _STEP: Final = 0.4
 _MOST_STEPS: Final = 4
 # A piece so far off its neighbour holds both sides of a step [s].
 _MIXED: Final = 0.12
-# Pieces from which on most must show a lag, and how many do [-]. Of those of 33 recorded and 15
-# simulated drives 0.94 and more do, with a speed in steps of 5 km/h 0.25 of a truck's.
-_ENOUGH: Final = 6
-_AGREES: Final = 0.2
 # Clocks are looked at again once they were moved; so often at most.
 _ROUNDS: Final = 4
 # Pieces that must show a lag, and lie on what is corrected [-].
@@ -188,8 +184,6 @@ def _lags(force: Integrated, speed: Signal) -> Lags:
 
 def _judged(lags: Lags, table: str) -> _Path | Problem | None:
     """Say how a table is to be moved, that it cannot be, or None where its clock is sound."""
-    if table == "obd" and lags.pieces >= _ENOUGH and _strangers(lags):
-        return Problem.of("clock.erratic", serious=True, found=lags.lag.size, pieces=lags.pieces)
     if lags.lag.size < _FEWEST:
         return None
     lone = _lone(lags.lag)
@@ -218,12 +212,6 @@ def _judged(lags: Lags, table: str) -> _Path | Problem | None:
         text = phrase("clock_drifts", slope=1e6 * slope) if drifts else ""
         return _Path(knots, float(np.mean(fit)) + slope * (knots - time.mean()), slope, (), text)
     return _broken(time, lag, table)
-
-
-def _strangers(lags: Lags) -> bool:
-    """Say whether hardly a piece shows a lag, or each another one."""
-    few = lags.lag.size < _AGREES * lags.pieces
-    return few or (lags.lag.size > 2 and float(np.median(np.abs(np.diff(lags.lag, 2)))) > _STEP)
 
 
 def _lost(lags: Lags) -> tuple[tuple[float, float], ...]:
