@@ -119,7 +119,6 @@ NAMED: Final[tuple[tuple[Callable[..., Any], dict[str, str]], ...]] = (
         "checks.inertial": "_check_parts _check_gravity _check_rate _check_axes",
         "checks.speed": "_check_alone _check_positions",
         "checks.vehicle": "_check_reference _check_gears",
-        "navigation.clock_drift": "_lost",
         "pipeline.notes": "unbacked other_equipment beside_speed overload beyond_class below_tare "
                           "lighter_than_known uncalibrated",
     }),

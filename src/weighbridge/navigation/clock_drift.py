@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
@@ -20,9 +20,8 @@ from weighbridge.navigation.clock_lag import (
 )
 from weighbridge.navigation.frozen import without_frozen
 from weighbridge.signals import QUANTITIES, Bools, Drive, Floats, Problem, Signal
-from weighbridge.signals.instants import instant, span
+from weighbridge.signals.instants import instant
 from weighbridge.signals.robust import huber, median_of_three, median_slope, spread
-from weighbridge.signals.runs import marked_runs
 
 _LOG = logging.getLogger(__name__)
 
@@ -57,13 +56,6 @@ _OWN: Final = (-1.0, 2.0)
 _BEGUN: Final = (-0.3, 0.8)
 # Two tables that drift alike against the third: it is the third whose clock is wrong [s].
 _ALIKE: Final = 0.15
-# Vehicle speed and speed over ground agree to within so much [m/s] and [-], at so many instants
-# [-], while they range over so much [m/s]: then it is the accelerometer that fits neither.
-_SPEEDS_APART: Final = (1.0, 0.1)
-_SPEEDS_AGREE: Final = 0.8
-_SPEEDS_RANGE: Final = 3.0
-# Part of such times in which both must be known [-].
-_SEEN: Final = 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,9 +125,6 @@ def _round(drive: Drive) -> Drive:
         if speed is None or len(speed) < 50:
             continue
         lags = _lags(force, speed)
-        lost = _lost(lags) if table == "obd" else ()
-        if lost:
-            return _left_out(drive, lost)
         path = _judged(lags, table)
         if isinstance(path, Problem):
             return drive.with_problems(path)
@@ -214,23 +203,6 @@ def _judged(lags: Lags, table: str) -> _Path | Problem | None:
     return _broken(time, lag, table)
 
 
-def _lost(lags: Lags) -> tuple[tuple[float, float], ...]:
-    """Times in which no piece shows a lag, though nearly all others do [s]."""
-    if lags.lag.size < _FEWEST:
-        return ()
-    time = np.concatenate((lags.time, lags.missed))
-    order = np.argsort(time)
-    time, shown = time[order], (np.arange(time.size) < lags.lag.size)[order]
-    runs = [(a, b) for a, b in zip(*marked_runs(~shown), strict=True) if b - a >= _FEWEST]
-    others = time.size - sum(b - a for a, b in runs)
-    if not runs or lags.lag.size < _FOLLOWS * others:
-        return ()
-    return tuple(
-        (float(time[a - 1]) if a else -np.inf, float(time[b]) if b < time.size else np.inf)
-        for a, b in runs
-    )
-
-
 def _broken(time: Floats, lag: Floats, table: str) -> _Path | Problem | None:
     """Follow a lag that changes by steps, or slowly but not evenly."""
     level_lag = median_of_three(lag)
@@ -262,42 +234,6 @@ def _broken(time: Floats, lag: Floats, table: str) -> _Path | Problem | None:
 
 def _hopeless(table: str, why: str) -> Problem:
     return Problem.of("clock.hopeless", serious=True, table=table, why=why)
-
-
-def _left_out(drive: Drive, lost: tuple[tuple[float, float], ...]) -> Drive:
-    """Leave out what is false where vehicle speed and accelerometer do not fit at all.
-
-    It is the accelerometer where GNSS agrees with the vehicle speed, and the rows of the bus where
-    it does not. Without GNSS it may be either.
-    """
-    first, last = drive.start, drive.end
-    text = " and ".join(span(round(max(a, first)), round(min(b, last))) for a, b in lost)
-    agree = _speeds_agree(drive, lost)
-    edges: dict[str, Any] = {"start": max(lost[0][0], first), "end": min(lost[-1][1], last)}
-    if agree is not None:
-        left, which = ("imu", "clock.no_lag_imu") if agree else ("obd", "clock.no_lag_obd")
-        return _moved(drive, left, lambda t: t, lost).with_problems(
-            Problem.of(which, spans=text, **edges)
-        )
-    for table in ("obd", "imu"):
-        drive = _moved(drive, table, lambda t: t, lost)
-    return drive.with_problems(Problem.of("clock.no_lag", spans=text, **edges))
-
-
-def _speeds_agree(drive: Drive, when: tuple[tuple[float, float], ...]) -> bool | None:
-    """Say whether vehicle speed and speed over ground are one in some times; None if unknown."""
-    speed, ground = drive.get("vehicle_speed"), _gnss_speed(drive)
-    if speed is None or ground is None or not len(speed) or not len(ground):
-        return None
-    every = np.arange(drive.start, drive.end, 1.0)
-    inside = np.logical_or.reduce([(every > a) & (every < b) for a, b in when])
-    time = every[inside & (speed.age(every) < _OWN[1]) & (ground.age(every) < _OWN[1])]
-    if time.size < _SEEN * np.count_nonzero(inside):
-        return None
-    own, other = speed.at(time), ground.at(time)
-    least, part = _SPEEDS_APART
-    near = np.abs(own - other) < least + part * np.abs(other)
-    return bool(np.ptp(other) > _SPEEDS_RANGE and np.mean(near) > _SPEEDS_AGREE)
 
 
 def _line(time: Floats, lag: Floats, scatter: float) -> tuple[float, float, Floats]:
