@@ -133,7 +133,7 @@ NAMED: Final[tuple[tuple[Callable[..., Any], dict[str, str]], ...]] = (
         "balance.floor": "find_floor",
         "balance.disagreement": "_change",
         "balance.second_signal": "follow",
-        "estimators.joint.changing": "largest in_place_of_loads",
+        "estimators.joint.changing": "largest",
         "estimators.joint.bend": "bent",
         "estimators.joint.contradicted": "contradicted",
         "estimators.joint.switched": "find_switched",
