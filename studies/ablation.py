@@ -205,7 +205,6 @@ NAMED: Final[tuple[tuple[Callable[..., Any], dict[str, str]], ...]] = (
         "balance.filled": "filled",
         "balance.foot": "_pressed _noisy",
         "balance.disagreement": "_smoothed",
-        "estimators.joint.load_stops": "too_hasty",
         "estimators.judging": "lacks_accelerometer",
         "navigation.clock_drift": "_lone",
         "navigation.identify.remounting": "_seen_by_gyro",
