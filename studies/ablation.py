@@ -177,7 +177,7 @@ NAMED: Final[tuple[tuple[Callable[..., Any], dict[str, str]], ...]] = (
     }),
     (_zero, {
         "balance.coarse": "coarse_std",
-        "balance.delay": "clock_shift far_shift",
+        "balance.delay": "clock_shift",
         "balance.instants": "identify_engine_delay",
         "balance.force_balance": "_air_std",
         "estimators.joint.load_stops": "unseen_std",

@@ -18,7 +18,6 @@ from weighbridge.balance.circumference import on_its_tyres
 from weighbridge.balance.delay import (
     clock_shift,
     estimate_torque_delay,
-    far_shift,
 )
 from weighbridge.balance.gear_fit import ENOUGH, ratio_apart, share_on_gears
 from weighbridge.balance.gear_scale import scale_contradiction
@@ -480,8 +479,6 @@ def torque_balance(drive: Drive, vehicle: Vehicle) -> tuple[ForceBalance, tuple[
     if begun is None or begun.delay != delay:
         begun = force_balance(drive, vehicle, motion, delay=delay)
     balance = replace(begun, navigation=navigation)
-    if behind := far_shift(balance, vehicle):
-        raise refused("torque.clock_alone", drive=drive.name, later=_later(-behind), by=-behind)
     return balance, notes + other_equipment(vehicle, motion) + balance.notes
 
 
