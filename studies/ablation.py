@@ -144,7 +144,6 @@ NAMED: Final[tuple[tuple[Callable[..., Any], dict[str, str]], ...]] = (
         "navigation.clock_lag": "find_offset",
         "navigation.clock_drift": "_broken",
         "calibration.charge": "in_their_air",
-        "signals.timeline": "_clock_set",
         "vehicle.power_balance": "find_power_balance",
         "balance.hybrid": "motor_helps",
         "checks.clocks": "_packets",
