@@ -116,7 +116,7 @@ NAMED: Final[tuple[tuple[Callable[..., Any], dict[str, str]], ...]] = (
         "checks.clocks": "check_rates check_overlap check_pauses",
         "checks.second_signals": "check_reading check_second_signals compared",
         "checks.steps": "check_steps",
-        "checks.inertial": "_check_parts _check_gravity _check_rate _check_axes",
+        "checks.inertial": "_check_gravity _check_rate _check_axes",
         "checks.speed": "_check_alone _check_positions",
         "checks.vehicle": "_check_reference _check_gears",
         "pipeline.notes": "unbacked other_equipment beside_speed overload beyond_class below_tare "
@@ -139,7 +139,7 @@ NAMED: Final[tuple[tuple[Callable[..., Any], dict[str, str]], ...]] = (
         "estimators.squat": "squat_by_speed",
         "navigation.identify.gain": "find_gain",
         "navigation.identify.alignment": "_check_speed_unit _nod",
-        "navigation.identify.mounting": "_check_axes _check_gravity",
+        "navigation.identify.mounting": "_check_axes",
         "navigation.layout": "_check_found",
         "navigation.clock_lag": "find_offset",
         "navigation.clock_drift": "_broken",

@@ -480,7 +480,7 @@ def test_accelerometer_that_reads_gravity_instead_of_specific_force(sane):
 
 
 def test_speed_counted_backwards(sane):
-    assert only(scaled(sane, vehicle_speed=-1.0).without(*GNSS)).id == "speed.sign"
+    assert only(scaled(sane, vehicle_speed=-1.0).without(*GNSS)).id == "range.outside"
 
 
 # Stuck, standing, apart

@@ -8,7 +8,7 @@ import pytest
 from numba import config
 from scipy.ndimage import gaussian_filter1d
 from scipy.signal import lfilter
-from tests.noted import refused, says
+from tests.noted import refused
 
 from weighbridge import Signal
 from weighbridge.checks import check_drive
@@ -301,16 +301,6 @@ def test_a_sensor_slower_than_its_table_is_told(car):
         drive = replaced(drive, names, values[np.arange(values.shape[0]) // 15 * 15])
     with refused("imu.slow"):
         inertial_motion(without_repeats(drive))
-
-
-def test_axes_swapped_on_the_way_are_told(car):
-    drive, _ = car
-    late = drive.signals["accel_x"].time > MIDDLE
-    force = columns(drive, ACCEL)
-    force[late, 1] *= -1.0
-    assert not any(p.serious for p in check_drive(drive))
-    (problem,) = [p for p in check_drive(replaced(drive, ACCEL, force)) if p.serious]
-    assert says(problem.text, "or_cut")
 
 
 @pytest.mark.parametrize("degrees", [3.0, -3.0])

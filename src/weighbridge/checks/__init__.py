@@ -28,7 +28,7 @@ from weighbridge.checks.second_signals import check_reading
 from weighbridge.checks.smoothed_imu import check_smoothed, without_smoothed
 from weighbridge.checks.speed import check_scales
 from weighbridge.checks.spikes import without_spikes
-from weighbridge.checks.travel import check_sign, check_standstill
+from weighbridge.checks.travel import check_standstill
 from weighbridge.checks.values import check_load, check_retarder, check_stuck
 from weighbridge.checks.vehicle import check_vehicle
 from weighbridge.navigation.along import with_forward_accel
@@ -53,7 +53,6 @@ _CHECKS: Final[tuple[_Check, ...]] = (
     check_friction,
     check_engine_speed,
     check_idle,
-    check_sign,
     check_standstill,
     check_scales,
     check_imu,
