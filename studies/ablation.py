@@ -169,9 +169,7 @@ NAMED: Final[tuple[tuple[Callable[..., Any], dict[str, str]], ...]] = (
         "estimators.joint.changing": "_without_launches",
         "estimators.joint.switched": "without_switched",
         "navigation.clock_drift": "correct_clocks _narrowed",
-        "navigation.identify.remounting": "undo",
         "calibration.joint": "_with_dragged _without",
-        "balance.foot": "unsmoothed",
         "signals.timeline": "one_recording well_formed",
     }),
     (_zero, {
