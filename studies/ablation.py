@@ -16,7 +16,8 @@ import json
 import pkgutil
 import sys
 import zlib
-from collections.abc import Callable, Iterator
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from functools import wraps
@@ -463,28 +464,31 @@ def _changes(before: list[dict[str, Any]], rows: dict[str, dict[str, Any]]) -> s
 
 
 def write() -> None:
-    """Write the page: parts that act nowhere, and what the others are worth."""
+    """Write the page: parts that act nowhere, what the others are worth, and what went."""
     whole = json.loads((KEPT / "record.json").read_text())
     before = [{k: r[k] for k in SCHEMA} for r in whole]
     again = _again_by_part()
-    acted = {
-        key: (
-            sum(key in r["weighing"] for r in whole),
-            sum(key in r["calibrating"] for r in whole),
-        )
-        for key in _parts()
-    }
-    idle = [f"`{key}`" for key, (weighed, made) in acted.items() if not weighed + made]
-    lines = [
-        (ROOT / "studies" / "ablation.template.md").read_text(encoding="utf-8").format(
-            pairs=len(whole), parts=len(acted), idle=len(idle), names=", ".join(idle)
-        )
-    ]  # fmt: skip
-    for key, (weighed, made) in sorted(acted.items(), key=lambda item: sum(item[1])):
-        if weighed + made:
+    weighed = Counter(key for r in whole for key in r["weighing"])
+    made = Counter(key for r in whole for key in r["calibrating"])
+    parts = _parts()
+    idle = [f"`{key}`" for key in parts if not weighed[key] + made[key]]
+
+    def rows(keys: Iterable[str]) -> str:
+        lines = []
+        for key in sorted(keys, key=lambda key: (weighed[key] + made[key], key)):
             found = _changes(before, again[key]) if key in again else "| | | |".join(("", ""))
-            lines.append(f"| `{key}` | {weighed} | {made} | {found} |\n")
-    (ROOT / "studies" / "ablation.md").write_text("".join(lines), encoding="utf-8")
+            lines.append(f"| `{key}` | {weighed[key]} | {made[key]} | {found} |\n")
+        return "".join(lines)
+
+    page = (ROOT / "studies" / "ablation.template.md").read_text(encoding="utf-8").format(
+        pairs=len(whole),
+        parts=len(parts),
+        idle=len(idle),
+        names="\n".join(f"- {name}" for name in idle),
+        kept=rows(key for key in parts if weighed[key] + made[key]),
+        gone=rows(again.keys() - parts.keys()),
+    )  # fmt: skip
+    (ROOT / "studies" / "ablation.md").write_text(page, encoding="utf-8")
 
 
 if __name__ == "__main__":
