@@ -275,6 +275,14 @@ def test_one_axis_that_drops_out_to_zero_is_left_out(car):
     assert slope == pytest.approx(1.0, abs=0.005)
 
 
+def test_a_range_too_small_for_gravity_is_told(car):
+    drive, _ = car
+    force = np.clip(columns(drive, ACCEL), -10.0, 10.0)
+    (problem,) = [p for p in check_drive(replaced(drive, ACCEL, force)) if p.serious]
+    assert problem.signal == "accel_z"
+    assert problem.id == "imu.clipped"
+
+
 def at_ten_hertz(drive):
     """Average the inertial samples over a tenth of a second."""
     for names in (ACCEL, GYRO):

@@ -21,7 +21,7 @@ from weighbridge.checks.engine import (
     check_idle,
     check_torque_sign,
 )
-from weighbridge.checks.frozen_imu import check_frozen
+from weighbridge.checks.frozen_imu import check_frozen, check_limit
 from weighbridge.checks.inertial import check_imu
 from weighbridge.checks.ranges import check_range, within_ranges, without_strays
 from weighbridge.checks.second_signals import check_reading
@@ -46,6 +46,7 @@ _CHECKS: Final[tuple[_Check, ...]] = (
     check_splices,
     check_stuck,
     check_frozen,
+    check_limit,
     check_smoothed,
     check_load,
     check_retarder,

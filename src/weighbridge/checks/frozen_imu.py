@@ -7,6 +7,7 @@ from typing import Final
 
 import numpy as np
 
+from weighbridge.constants import GRAVITY
 from weighbridge.messages import phrase
 from weighbridge.navigation.frozen import frozen_stretches
 from weighbridge.signals import Drive, Problem, Signal
@@ -16,6 +17,9 @@ from weighbridge.vehicle.model import Vehicle
 
 _REPORTED: Final = 5.0
 """Frozen for less in all is left out without a word [s]."""
+
+_AT_LIMIT: Final = 0.05
+"""With a larger part of its samples at one extreme value an axis is clipped [-]."""
 
 _LEAST: Final = 120.0
 """What is left must be as long to show how the sensor sits and what moved [s]."""
@@ -79,3 +83,17 @@ def _reported(names: list[str], axis: Signal, speed: Signal | None) -> Problem:
         more=phrase("frozen_more", count=lengths.size, total=total) if lengths.size > 1 else "",
         left=left,
     )
+
+
+def check_limit(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
+    """Find an accelerometer whose range is too small for gravity and the road's shaking."""
+    for name in IMU_SIGNALS[:3]:
+        s = drive.get(name)
+        if s is None or len(s) < 50:
+            continue
+        for limit in (float(s.values.min()), float(s.values.max())):
+            share = float(np.mean(s.values == limit))
+            if _AT_LIMIT < share < 0.9 and 0.5 * GRAVITY < abs(limit) < 2.0 * GRAVITY:
+                yield Problem.of(
+                    "imu.clipped", name, serious=True, limit=limit, share=100.0 * share
+                )
