@@ -201,7 +201,6 @@ NAMED: Final[tuple[tuple[Callable[..., Any], dict[str, str]], ...]] = (
         "balance.filled": "filled",
         "balance.foot": "_pressed _noisy",
         "estimators.judging": "lacks_accelerometer",
-        "navigation.clock_drift": "_lone",
         "navigation.identify.remounting": "_seen_by_gyro",
         "balance.braking": "_misses _braked _trailing retarder_untold",
     }),

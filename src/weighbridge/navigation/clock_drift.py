@@ -175,10 +175,7 @@ def _judged(lags: Lags, table: str) -> _Path | Problem | None:
     """Say how a table is to be moved, that it cannot be, or None where its clock is sound."""
     if lags.lag.size < _FEWEST:
         return None
-    lone = _lone(lags.lag)
-    time, lag = lags.time[~lone], lags.lag[~lone]
-    if lag.size < _FEWEST:
-        return None
+    time, lag = lags.time, lags.lag
     # By second differences, so that neither drift nor step counts as scatter.
     scatter = max(spread(np.diff(lag, 2)) / np.sqrt(6.0), float(np.median(lags.std)))
     slope, slope_std, fit = _line(time, lag, scatter)
@@ -251,15 +248,6 @@ def _line(time: Floats, lag: Floats, scatter: float) -> tuple[float, float, Floa
         middle = float(np.sum((lag - slope * t) * weight) / total)
     std = scatter * float(np.sqrt(_OVERLAP / max(np.sum(weight * t**2), 1e-9)))
     return slope, std, middle + slope * t
-
-
-def _lone(lag: Floats) -> Bools:
-    """Mark pieces far from both neighbours, which agree: a false peak."""
-    lone = np.zeros(lag.size, dtype=bool)
-    before, here, after = lag[:-2], lag[1:-1], lag[2:]
-    off = np.minimum(np.abs(here - before), np.abs(here - after))
-    lone[1:-1] = (off > 2.0 * _STEP) & (np.abs(before - after) < _STEP)
-    return lone
 
 
 def _alike(a: _Path, b: _Path) -> bool:
