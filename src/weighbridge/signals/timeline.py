@@ -20,8 +20,8 @@ _LIMITS: Final = (NO_DRIVE, 3600.0, 600.0, 60.0)
 # Span allowed: at least [s], and per time in which something was recorded [-].
 _SPARE: Final = 12 * 3600.0
 _IDLE: Final = 20.0
-# A sample means so long at most [s].
-_STANDS_FOR: Final = 2.0
+STANDS_FOR: Final = 2.0
+"""A sample means so long at most [s]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,7 +127,7 @@ def _weight(part: _Part, clocks: dict[int, Floats], tables: dict[int, str]) -> f
 def _recorded(part: _Part, clocks: dict[int, Floats]) -> float:
     """Time for which the samples of the best clock of a part stand [s]."""
     return max(
-        float(np.minimum(np.diff(clocks[p.clock][p.first : p.last]), _STANDS_FOR).sum())
+        float(np.minimum(np.diff(clocks[p.clock][p.first : p.last]), STANDS_FOR).sum())
         for p in part
     )
 
