@@ -16,7 +16,8 @@ import json
 import pkgutil
 import sys
 import zlib
-from collections.abc import Callable, Iterator
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from functools import wraps
@@ -114,62 +115,67 @@ def _passed(found: Any, *given: Any) -> Any:
 NAMED: Final[tuple[tuple[Callable[..., Any], dict[str, str]], ...]] = (
     (_nothing, {
         "checks.clocks": "check_rates check_overlap check_pauses",
-        "checks.second_signals": "check_reading check_witnesses witnessed",
+        "checks.second_signals": "check_reading check_second_signals compared",
         "checks.steps": "check_steps",
-        "checks.inertial": "_check_parts _check_gravity _check_rate _check_axes",
-        "checks.speed": "_check_alone _check_positions _check_altitude",
+        "checks.inertial": "_check_gravity _check_rate _check_axes",
+        "checks.speed": "_check_alone _check_positions",
         "checks.vehicle": "_check_reference _check_gears",
-        "navigation.clock_drift": "_lost",
         "pipeline.notes": "unbacked other_equipment beside_speed overload beyond_class below_tare "
                           "lighter_than_known uncalibrated",
     }),
     (_none, {
         "checks.inertial": "_not_about_vertical _against_course _against_speed",
-        "checks.speed": "_usual_gearing _gear_ratio _accel_ratio _grade_ratio",
+        "checks.speed": "_usual_gearing _gear_ratio _accel_ratio _beyond_belief",
         "balance.bandwidth": "smoothed_torque",
         "balance.shaking": "shaken",
         "balance.gear_scale": "scale_contradiction _changing",
-        "balance.gear_fit": "foreign_part share_on_gears",
+        "balance.gear_fit": "share_on_gears",
         "balance.filled": "identify_fill",
         "balance.floor": "find_floor",
-        "balance.disagreement": "_change",
-        "balance.second_signal": "follow",
-        "estimators.joint.changing": "largest in_place_of_loads",
+        "balance.second_signal": "lateness",
+        "estimators.joint.changing": "largest",
         "estimators.joint.bend": "bent",
         "estimators.joint.contradicted": "contradicted",
         "estimators.joint.switched": "find_switched",
         "estimators.squat": "squat_by_speed",
         "navigation.identify.gain": "find_gain",
         "navigation.identify.alignment": "_check_speed_unit _nod",
-        "navigation.identify.mounting": "_check_axes _check_gravity",
+        "navigation.identify.mounting": "_check_axes",
         "navigation.layout": "_check_found",
         "navigation.clock_lag": "find_offset",
         "navigation.clock_drift": "_broken",
         "calibration.charge": "in_their_air",
-        "calibration.known_mass": "scale_doubt fuel_doubt drag_doubt",
-        "signals.timeline": "_clock_set",
         "vehicle.power_balance": "find_power_balance",
+        "balance.hybrid": "motor_helps",
+        "checks.clocks": "_packets",
+        "calibration.known_mass": "scale_finding fuel_finding drag_finding check_mass",
+        "calibration.joint": "_refuse_strange",
+        "calibration.questionable_masses": "refuse_too_heavy",
+        "calibration.problem": "_refuse_foreign_gears",
+        "calibration.run": "_refuse_useless unfound_gears",
+        "calibration.fitted": "check_delay",
     }),
     (_first, {
         "signals.held": "without_repeats",
-        "signals.timeline": "one_recording",
         "checks.derived": "without_derived",
         "checks.digits": "with_half_digits",
         "checks.spikes": "without_spikes",
         "checks.ranges": "without_strays within_ranges",
         "checks.smoothed_imu": "without_smoothed",
         "checks.correcting": "corrected _without_frozen _without_false _without_ends",
-        "checks.second_signals": "_without_frozen",
-        "checks.inertial": "_without_spikes",
-        "navigation.clock_drift": "correct_clocks _narrowed",
         "navigation.along": "with_forward_accel",
         "navigation.frozen": "without_frozen",
         "vehicle.as_read": "as_read",
         "estimators.squat": "of_vehicle",
+        "estimators.joint.changing": "_without_launches",
+        "estimators.joint.switched": "without_switched",
+        "navigation.clock_drift": "correct_clocks _narrowed",
+        "calibration.joint": "_with_dragged _without",
+        "signals.timeline": "one_recording well_formed",
     }),
     (_zero, {
         "balance.coarse": "coarse_std",
-        "balance.delay": "clock_shift far_shift",
+        "balance.delay": "clock_shift",
         "balance.instants": "identify_engine_delay",
         "balance.force_balance": "_air_std",
         "estimators.joint.load_stops": "unseen_std",
@@ -183,27 +189,25 @@ NAMED: Final[tuple[tuple[Callable[..., Any], dict[str, str]], ...]] = (
         "navigation.longitudinal": "_lateness",
         "calibration.uncertain_motion": "gain_std",
         "vehicle.power_balance": "_lateness",
+        "pipeline.weighing": "_other_clock",
     }),
     (_false, {
         "checks.false_samples": "isolated piled clipped",
         "checks.frozen": "frozen",
-        "checks.second_signals": "_outvoted",
         "checks.steps": "_cleared",
-        "navigation.dropouts": "false_rows rare_spikes repeated_rows _spikes _zeros _clipped",
-        "navigation.identify.gain": "_upheld _smoothed _rougher",
-        "navigation.clock_drift": "_strangers",
+        "navigation.dropouts": "false_rows _spikes _zeros",
+        "navigation.identify.gain": "_upheld _smoothed",
         "balance.cornering": "cornering",
         "balance.filled": "filled",
-        "balance.braking": "_misses _braked _trailing",
         "balance.foot": "_pressed _noisy",
-        "balance.disagreement": "_smoothed",
-        "estimators.joint.load_stops": "too_hasty",
         "estimators.judging": "lacks_accelerometer",
+        "navigation.identify.remounting": "_seen_by_gyro",
+        "balance.braking": "_misses _braked _trailing retarder_untold",
     }),
     (_empty, {
         "calibration.questionable_masses": "questionable_masses contradicting unbacked_scale",
         "calibration.uncertain_motion": "uncertain_gains",
-        "calibration.run": "_mass_doubts _balance_notes",
+        "calibration.run": "_mass_findings _balance_notes",
         "navigation.identify.remounting": "find_changes",
     }),
     (_passed, {
@@ -211,7 +215,7 @@ NAMED: Final[tuple[tuple[Callable[..., Any], dict[str, str]], ...]] = (
                               "_plausible",
     }),
     (_no_rows, {"navigation.frozen": "frozen_stretches"}),
-    (_same_setup, {"navigation.identify.rounds": "_doubted"}),
+    (_same_setup, {"navigation.identify.rounds": "_uncertain"}),
     (_second, {"balance.charge": "in_this_air"}),
     (_vehicle_first, {"vehicle.power_balance": "by_power"}),
     (_vehicle_kept, {"balance.circumference": "on_its_tyres"}),
@@ -459,28 +463,31 @@ def _changes(before: list[dict[str, Any]], rows: dict[str, dict[str, Any]]) -> s
 
 
 def write() -> None:
-    """Write the page: parts that act nowhere, and what the others are worth."""
+    """Write the page: parts that act nowhere, what the others are worth, and what went."""
     whole = json.loads((KEPT / "record.json").read_text())
     before = [{k: r[k] for k in SCHEMA} for r in whole]
     again = _again_by_part()
-    acted = {
-        key: (
-            sum(key in r["weighing"] for r in whole),
-            sum(key in r["calibrating"] for r in whole),
-        )
-        for key in _parts()
-    }
-    idle = [f"`{key}`" for key, (weighed, made) in acted.items() if not weighed + made]
-    lines = [
-        (ROOT / "studies" / "ablation.template.md").read_text(encoding="utf-8").format(
-            pairs=len(whole), parts=len(acted), idle=len(idle), names=", ".join(idle)
-        )
-    ]  # fmt: skip
-    for key, (weighed, made) in sorted(acted.items(), key=lambda item: sum(item[1])):
-        if weighed + made:
+    weighed = Counter(key for r in whole for key in r["weighing"])
+    made = Counter(key for r in whole for key in r["calibrating"])
+    parts = _parts()
+    idle = [f"`{key}`" for key in parts if not weighed[key] + made[key]]
+
+    def rows(keys: Iterable[str]) -> str:
+        lines = []
+        for key in sorted(keys, key=lambda key: (weighed[key] + made[key], key)):
             found = _changes(before, again[key]) if key in again else "| | | |".join(("", ""))
-            lines.append(f"| `{key}` | {weighed} | {made} | {found} |\n")
-    (ROOT / "studies" / "ablation.md").write_text("".join(lines), encoding="utf-8")
+            lines.append(f"| `{key}` | {weighed[key]} | {made[key]} | {found} |\n")
+        return "".join(lines)
+
+    page = (ROOT / "studies" / "ablation.template.md").read_text(encoding="utf-8").format(
+        pairs=len(whole),
+        parts=len(parts),
+        idle=len(idle),
+        names="\n".join(f"- {name}" for name in idle),
+        kept=rows(key for key in parts if weighed[key] + made[key]),
+        gone=rows(again.keys() - parts.keys()),
+    )  # fmt: skip
+    (ROOT / "studies" / "ablation.md").write_text(page, encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -34,3 +34,9 @@ HUBER: Final = 1.345
 
 SAMPLES_AT_ONCE: Final = 1 << 20
 """Samples of a drive that are looked at together, where those of a day have no room twice."""
+
+INDEPENDENT: Final = 60.0
+"""Errors of wind, grade and torque that are farther apart are independent [s]."""
+
+CRUISE: Final = 100.0 / 3.6
+"""Speed at which ratios and road load are reported [m/s]."""

@@ -153,6 +153,29 @@ class Problem:
         )
 
 
+class Explained:
+    """A result with what was found: its ``refusal``, None where there is none, and `problems`."""
+
+    __slots__ = ()
+    refusal: Problem | None
+    problems: tuple[Problem, ...]
+
+    @property
+    def reason(self) -> str:
+        """Why there is no mass, one sentence; empty where there is."""
+        return "" if self.refusal is None else self.refusal.text
+
+    @property
+    def reason_id(self) -> str | None:
+        """Id of that sentence; None where there is a mass."""
+        return None if self.refusal is None else self.refusal.id
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Texts of the `problems`."""
+        return tuple(p.text for p in self.problems)
+
+
 def _form(id: str) -> str:
     """Return a message of the catalogue with its fields in braces."""
     message = catalogue()[id]

@@ -80,17 +80,6 @@ def test_a_clock_that_starts_in_1970_leaves_the_longer_part(sane, names):
     assert settled.signals["accel_x"].duration > 600.0
 
 
-@pytest.mark.parametrize("at", [200.0, 700.0])
-def test_a_clock_set_in_motion_is_joined(sane, at):
-    settled = correct_drive(shifted(sane, sane.signals, at, 1.7e9), CAR)
-    assert not any(p.serious for p in settled.problems)
-    assert "clock.jump_joined" in ids(settled.problems)
-    for name, s in sane.signals.items():
-        found = settled.signals[name]
-        assert_array_equal(found.values, s.values)
-        assert np.ptp(found.time - s.time) < 0.03
-
-
 def test_parts_of_two_recordings_are_not_joined(sane):
     """Standing at the jump, they may be of two days and loads."""
     v = sane.signals["vehicle_speed"]

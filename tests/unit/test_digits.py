@@ -79,8 +79,6 @@ def test_digits_that_are_cut_off_get_half_a_step(drive, step):
     [
         (0.15, np.trunc, "imu.digits_dead"),
         (0.2, np.trunc, "imu.digits_dead"),
-        (0.5, np.trunc, "imu.digits_coarse"),
-        (0.5, np.round, "imu.digits_coarse"),
     ],
 )
 def test_digits_that_nothing_mends_are_refused(drive, step, how, id):

@@ -270,23 +270,12 @@ def test_every_method_obeys_a_scale_that_changes(fleet, method):
 
 
 @pytest.mark.parametrize("method", ["joint", "rls", "robust-rls", "ekf", "hybrid"])
-def test_air_flow_shows_a_load_that_is_scaled_or_smoothed(fleet, method):
+def test_air_flow_shows_a_load_that_is_scaled(fleet, method):
     (witness,) = fleet.files["car"].witnesses
     assert witness.signal == "mass_air_flow"
-
-    scaled = as_sent("car", lambda _, x: 0.8 * x)
-
-    def smoothed(t, x):
-        made, _ = lfilter([0.08], [1.0, -0.92], x, zi=[0.92 * x[0]])
-        return made
-
-    for change, id, name, value in (
-        (scaled, "torque.witness", "scale", pytest.approx(0.8, abs=0.005)),
-        (smoothed, "torque.blurred", "blur", pytest.approx(3.0, abs=0.5)),
-    ):
-        damaged = with_signal(fleet.drive("car"), "engine_load", change)
-        with refused(id, **{name: value}):
-            fleet.weigh("car", damaged, method)
+    damaged = with_signal(fleet.drive("car"), "engine_load", as_sent("car", lambda _, x: 0.8 * x))
+    with refused("torque.witness", scale=pytest.approx(0.8, abs=0.005)):
+        fleet.weigh("car", damaged, method)
 
 
 def test_a_load_that_changes_at_stops_is_no_change_of_scale(fleet):
@@ -628,9 +617,12 @@ def test_a_motor_torque_cut_off_at_either_end_is_weighed_by_the_rest(fleet):
 def test_a_speed_that_alone_is_seconds_late_gives_no_mass(fleet, kind, late):
     drive = fleet.drive(kind)
     speed = drive.signals["vehicle_speed"]
-    with refused("clock.torque_apart", "torque.clock_alone") as told:
-        fleet.weigh_alone(kind, drive.with_signals(replace(speed, time=speed.time + late)))
-    assert 3.0 <= abs(told.value.problem.values["by"]) < 5.0
+    moved = drive.with_signals(replace(speed, time=speed.time + late))
+    if late < 0.0:
+        with refused("clock.torque_apart"):
+            fleet.weigh_alone(kind, moved)
+    else:
+        assert np.isnan(fleet.weigh_alone(kind, moved).mass)
 
 
 def test_a_trip_of_another_vehicle_behind_a_pause_gives_no_mass(fleet):

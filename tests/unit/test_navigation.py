@@ -15,7 +15,6 @@ from weighbridge import ConfigError, Drive, Signal, Vehicle
 from weighbridge.constants import GRAVITY
 from weighbridge.kernels.ins_model import P
 from weighbridge.kernels.lowpass import lowpass_resample
-from weighbridge.messages import phrase
 from weighbridge.navigation.geodesy import LocalFrame
 from weighbridge.navigation.identify.timing import estimate_speed_delay
 from weighbridge.navigation.inertial import inertial_motion
@@ -178,22 +177,6 @@ def test_mirrored_axes_are_refused(hills):
     mirrored = drive.with_signals(Signal("accel_y", y.time, -y.values))
     with refused("imu.axes_mirrored"):
         inertial_motion(mirrored)
-
-
-def test_accelerometer_in_g_is_refused(hills):
-    drive, _ = hills
-    g = [Signal(f"accel_{a}", s.time, s.values / GRAVITY)
-         for a in "xyz" for s in [drive.signals[f"accel_{a}"]]]  # fmt: skip
-    with refused("imu.gravity_mean", hint=phrase("looks_like_g")):
-        inertial_motion(drive.with_signals(*g))
-
-
-def test_gyro_in_degrees_is_refused(hills):
-    drive, _ = hills
-    d = [Signal(f"gyro_{a}", s.time, np.degrees(s.values))
-         for a in "xyz" for s in [drive.signals[f"gyro_{a}"]]]  # fmt: skip
-    with refused("imu.gyro_scale"):
-        inertial_motion(drive.with_signals(*d))
 
 
 @pytest.mark.parametrize("factor", [1.0 / 1.609344, 1.609344, 3.6])

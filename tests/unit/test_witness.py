@@ -6,7 +6,6 @@ from functools import cache
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from scipy.signal import lfilter
 from tests.noted import error, refused
 
 import weighbridge as wb
@@ -75,14 +74,6 @@ def changed(made, name, change):
     return made.with_signals(replace(s, values=change(s.time, s.values)))
 
 
-def smoothed(span):
-    def change(time, x):
-        kept = np.exp(-np.median(np.diff(time)) / span)
-        return lfilter([1.0 - kept], [1.0, -kept], x, zi=[kept * x[0]])[0]
-
-    return change
-
-
 @cache
 def known_drives():
     return [drive(seed) for seed in (1, 2, 3)]
@@ -107,7 +98,6 @@ def test_the_relation_gives_the_reading_back():
     for relation in found:
         assert relation.scatter < 0.02 * relation.span
         assert (relation.pressure, relation.temperature) == (1.0e5, 288.0)
-        assert relation.blur == 0.0
         assert abs(relation.lag) <= 0.25
 
 
@@ -148,12 +138,6 @@ def test_other_drives_agree():
 FAULTS = {
     "scale 0.8": (lambda t, x: 0.8 * x, {"scale": 0.8, "than": "as"}),
     "scale 1.25": (lambda t, x: 1.25 * x, {"scale": 1.25, "than": "as"}),
-    "scale from the middle": (lambda t, x: np.where(t < MIDDLE, x, 0.8 * x), {"start": MIDDLE}),
-    "scale until the middle": (lambda t, x: np.where(t < MIDDLE, 0.8 * x, x), {"end": MIDDLE}),
-    "ramp": (lambda t, x: x * (1.0 - 0.25 * t / END), {"than": "as"}),
-    "offset from the middle": (lambda t, x: x + 0.12 * (t > MIDDLE), {"than": "than"}),
-    "smoothed by 1 s": (smoothed(1.0), {"blur": 1.0}),
-    "smoothed by 3 s": (smoothed(3.0), {"blur": 3.0}),
 }
 
 
@@ -165,14 +149,13 @@ def test_a_reading_that_left_its_only_witness_gives_no_mass(fault):
     )
     assert problem.serious
     assert problem.signal == "engine_load"
-    found = {"start": problem.start, "end": problem.end, **problem.values}
-    assert problem.id == ("torque.blurred" if "blur" in expected else "torque.witness")
+    found = problem.values
+    assert problem.id == "torque.witness"
     for name, value in expected.items():
         if isinstance(value, str):
             assert found[name] == value
         else:
-            near = 60.0 if name in ("start", "end") else 0.02 * value
-            assert found[name] == pytest.approx(value, abs=near)
+            assert found[name] == pytest.approx(value, rel=0.02)
 
 
 @pytest.mark.parametrize(
@@ -206,21 +189,6 @@ def test_a_moderate_disagreement_with_a_reading_altered_on_the_way_gives_no_mass
     assert steps.serious
     assert witness.serious
     assert not any(p.serious for p in check_reading(sent, known))
-
-
-def test_where_the_change_begins_is_told():
-    made = changed(drive(20), "engine_load", lambda t, x: np.where(t < 1050.0, x, 0.8 * x))
-    (found,) = findings(made, learnt("mass_air_flow"))
-    assert abs(found.start - 1050.0) < 0.06 * END
-    assert abs(found.scale - 0.8) < 0.02
-
-
-def test_a_small_change_in_the_drive_is_told_against_what_was_before():
-    # 3 % up before and down after: neither leaves what drives of one car differ by.
-    made = changed(drive(20), "engine_load", lambda t, x: np.where(t < MIDDLE, 1.03, 0.97) * x)
-    (problem,) = check_second_signals(made, learnt("mass_air_flow"))
-    assert not problem.serious
-    assert problem.id == "torque.witness"
 
 
 def test_two_witnesses_say_that_the_reading_is_wrong():
@@ -395,7 +363,6 @@ def test_a_relation_is_one_of_a_known_signal():
         ({"signal": "throttle"}, "signal throttle"),
         ({"coefficients": (1.0, 2.0)}, "4 mass_air_flow 2"),
         ({"span": 0.0}, "span 0.0"),
-        ({"blur": -1.0}, "blur -1.0"),
     ):
         with error(wb.ConfigError, words):
             replace(good, **fields)
@@ -422,14 +389,7 @@ def test_a_witness_that_only_unknown_air_makes_agree_clears_nothing():
         assert [p.signal for p in found] == ["engine_torque"]
 
 
-def test_a_witness_that_froze_or_is_on_another_clock_accuses_nobody():
-    def stuck(time, x):
-        return np.where(time < 900.0, x, x[np.searchsorted(time, 900.0)])
-
-    assert (
-        check_second_signals(changed(drive(20), "mass_air_flow", stuck), learnt("mass_air_flow"))
-        == ()
-    )
+def test_a_witness_that_is_on_another_clock_accuses_nobody():
     late = drive(20)
     air = late.signals["mass_air_flow"]
     late = late.with_signals(Signal(air.name, air.time + 2.5, air.values))

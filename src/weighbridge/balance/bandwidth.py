@@ -9,6 +9,7 @@ import numpy as np
 
 from weighbridge.balance.law import force_on_mass
 from weighbridge.balance.table import ForceBalance
+from weighbridge.constants import INDEPENDENT
 from weighbridge.messages import Problem
 from weighbridge.signals import Bools, Floats
 from weighbridge.vehicle.model import Vehicle
@@ -39,8 +40,6 @@ MOSTLY_MOTION: Final = 0.5
 THERE: Final = 0.6
 """Part of the time before and after that rows have to cover [-]."""
 
-BLOCK: Final = 60.0
-"""Blocks left out in turn show how the ratio scatters [s]."""
 
 FEWEST_BLOCKS: Final = 5
 """Fewer blocks show no standard deviation."""
@@ -170,7 +169,7 @@ def _slopes(
         v, t = ([x[k[whole]] for k in (before, here, after - 1)] for x in (speed, time))
         accel = (v[2] - v[1]) / (t[2] - t[1]) - (v[1] - v[0]) / (t[1] - t[0])
         common, square = by_force * accel, by_motion * accel
-    block = ((time[whole] - time[0]) / BLOCK).astype(np.int64)
+    block = ((time[whole] - time[0]) / INDEPENDENT).astype(np.int64)
     return np.bincount(block, common).astype(float), np.bincount(block, square).astype(float)
 
 

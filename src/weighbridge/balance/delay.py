@@ -12,8 +12,7 @@ from weighbridge.balance.law import force_on_mass
 from weighbridge.balance.table import ForceBalance, ForceTable
 from weighbridge.navigation.motion import Motion
 from weighbridge.signals import Drive, Floats
-from weighbridge.signals.correlation import correlation, correlations
-from weighbridge.signals.interpolation import interpolate
+from weighbridge.signals.correlation import correlation
 from weighbridge.vehicle.model import Vehicle
 
 EARLIEST: Final = -0.4
@@ -33,19 +32,6 @@ FURTHER: Final = 0.8
 SAME_CLOCK: Final = 0.15
 """Torque later or earlier than in the calibration by less is on the same clock [s]: in 15 simulated
 drives of five vehicles it differed by 0.05 s at most. Masses are 0.2 % light at 0.15 s."""
-
-ELSEWHERE: Final = 1.5
-"""Motion later or earlier than its torque by so much is another clock [s]."""
-
-_SOUGHT: Final = 30.0
-"""Farthest that such a clock is looked for [s]: as far as clocks of tables are put together."""
-
-_STEP: Final = 0.25
-"""Rows nearer to each other show nothing more of a shift of half seconds [s]."""
-
-_CLEARER: Final = 0.5
-"""Misfit there over the misfit near by at which it is one [-]: at 4 s it was 0.09, in an undamaged
-drive the misfit 2 s away is 18 times that near by."""
 
 _NEAR_BY: Final = 0.3
 """Shifts compared with none at first [s]."""
@@ -209,39 +195,6 @@ def clock_shift(
         return 0.0
     near = slice(best - 1, best + 2)
     return vertex(shifts[near], scores[near])
-
-
-def far_shift(balance: ForceBalance, vehicle: Vehicle) -> float:
-    """Find by how many seconds the motion is behind its force; 0 where it is not far off.
-
-    Tables are put together by their speeds. Where the speed alone is late, its table is moved
-    with all that is right in it, and the torque then lies far from the motion it made.
-
-    Returns
-    -------
-    Coarse, to half a second [s]; negative where the motion is ahead
-    """
-    table = balance.table
-    known = np.isfinite(table.specific_force)
-    force = force_on_mass(table, vehicle)
-    rows = np.flatnonzero(table.usable & np.isfinite(force))
-    if rows.size < 100 or np.count_nonzero(known) < 100:
-        return 0.0
-    rows = rows[:: _thinned(table.time[rows])]
-    time, specific = table.time[known], table.specific_force[known]
-    shifts = np.arange(-_SOUGHT, _SOUGHT + 0.25, 0.5)
-    moved = (interpolate(table.time[rows] + s, time, specific) for s in shifts)
-    misfit = 1.0 - correlations(force[rows], moved)
-    best = int(np.argmin(misfit))
-    near = float(misfit[np.abs(shifts) < ELSEWHERE].min())
-    far = abs(shifts[best]) >= ELSEWHERE and misfit[best] < _CLEARER * near
-    return float(shifts[best]) if far else 0.0
-
-
-def _thinned(time: Floats) -> int:
-    """Every how many rows two are `_STEP` apart, as a rule; no more than leave a hundred."""
-    apart = float(np.median(np.diff(time)))
-    return max(1, min(int(_STEP / apart) if apart > 0.0 else 1, time.size // 100))
 
 
 def _little(

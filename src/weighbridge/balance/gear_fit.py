@@ -7,11 +7,10 @@ from typing import Final
 import numpy as np
 
 from weighbridge.balance.table import ForceBalance
-from weighbridge.messages import Problem
+from weighbridge.constants import CRUISE
 from weighbridge.signals import Floats
-from weighbridge.signals.instants import span
 from weighbridge.signals.units import scalar_from_si
-from weighbridge.vehicle.gear import steady
+from weighbridge.vehicle.gear import SLIPS, steady
 from weighbridge.vehicle.model import Vehicle
 
 NEAR: Final = 0.04
@@ -23,15 +22,6 @@ apart, catch a quarter by chance; a file that lacks one of its gears keeps more 
 
 FEWEST_RATIOS: Final = 100
 """Steady ratios needed to judge."""
-
-PAUSE: Final = 60.0
-"""After so long without rows another recording may begin [s]."""
-
-_CRUISE: Final = 100.0 / 3.6
-"""Speed at which a ratio is reported as an engine speed [m/s]."""
-
-SLOWEST: Final = 3.0
-"""Below, clutches slip [m/s]."""
 
 
 def share_on_gears(balance: ForceBalance, vehicle: Vehicle) -> float | None:
@@ -80,38 +70,7 @@ def ratio_apart(balance: ForceBalance, vehicle: Vehicle) -> tuple[float, float]:
 
 def _rpm(ratio: float) -> float:
     """Engine speed at 100 km/h of the logarithm of a ratio [rpm]."""
-    return scalar_from_si(float(np.exp(ratio)) * _CRUISE, "rpm")
-
-
-def foreign_part(balance: ForceBalance, vehicle: Vehicle) -> Problem | None:
-    """Say which part of a recording, before or after a pause, is another vehicle's; None if none.
-
-    Parameters
-    ----------
-    balance, vehicle
-    """
-    if not _known(vehicle):
-        return None
-    time, ratio = held_ratios(balance)
-    rows = balance.table.time
-    begins = rows[1:][np.diff(rows) > PAUSE]
-    number = np.searchsorted(begins, time, side="right")
-    for k in range(begins.size + 1):
-        part = number == k
-        if np.count_nonzero(part) < FEWEST_RATIOS:
-            continue
-        share = _share(ratio[part], vehicle)
-        if share < ENOUGH:
-            begin, end = float(time[part][0]), float(time[part][-1])
-            return Problem.of(
-                "vehicle.foreign_part",
-                start=begin,
-                end=end,
-                span=span(begin, end),
-                share=100.0 * share,
-                vehicle=vehicle.name,
-            )
-    return None
+    return scalar_from_si(float(np.exp(ratio)) * CRUISE, "rpm")
 
 
 def _share(ratio: Floats, vehicle: Vehicle) -> float:
@@ -146,7 +105,7 @@ def held_ratios(balance: ForceBalance) -> tuple[Floats, Floats]:
     ratio : (n,) of ratios in 1/m
     """
     table, engine_speed = balance.table, balance.table.engine_speed
-    pulling = (table.speed > SLOWEST) & (table.accel > 0.0) & (engine_speed > 0.0)
+    pulling = (table.speed > SLIPS) & (table.accel > 0.0) & (engine_speed > 0.0)
     ratio = np.where(pulling, engine_speed / np.where(pulling, table.speed, 1.0), 0.0)
     held = pulling & steady(table.time, ratio, np.full(ratio.size, 0.02))
     return table.time[held], np.log(ratio[held])

@@ -16,7 +16,6 @@ import numpy as np
 from scipy.ndimage import median_filter
 
 from weighbridge.errors import DriveError
-from weighbridge.kernels.first_order import even_lag
 from weighbridge.signals import Bools, Drive, Floats, Ints, Signal
 from weighbridge.signals.correlation import correlations
 from weighbridge.signals.interpolation import interpolate
@@ -34,14 +33,11 @@ SLOWEST: Final = 2.0
 SLOWEST_MOTOR: Final = 6.0
 """Battery power over motor speed says little of the torque below this vehicle speed [m/s]."""
 
-BLURS: Final = (0.0, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0)
-"""Time constants that are tried for a reading smoother than its second signal [s]."""
-
 DELAYS: Final = tuple(float(d) for d in np.arange(-1.0, 1.51, 0.25))
-"""Delays of the reading against its second signal that are tried beside [s]."""
+"""Delays of the reading against its second signal that are tried [s]."""
 
 SLOW_PERIOD: Final = 1.0
-"""Signals sampled more slowly show no blur [s]."""
+"""Signals sampled more slowly show no delay [s]."""
 
 BLOCKS: Final = 12
 """Parts of a drive that are left out one after another for a standard deviation."""
@@ -167,51 +163,21 @@ class Means:
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class Comparison:
     """Reading against what a second signal shows, ``reading = level + scale (told - told's mean)``.
 
     Attributes
     ----------
-    scale : [-]
-    level : reading where the second signal shows ``predicted``, in the reading's unit
+    scale, scale_std : with its standard deviation [-]
+    level, level_std : reading where the second signal shows ``predicted``, in the reading's unit
     predicted : mean of what the second signal shows
     """
 
     scale: float
     level: float
     predicted: float
-
-
-@dataclass(frozen=True, slots=True)
-class Comparison(Line):
-    """A line with its standard deviations.
-
-    Attributes
-    ----------
-    scale_std : [-]
-    level_std : in the reading's unit
-    """
-
     scale_std: float
     level_std: float
-
-
-@dataclass(frozen=True, slots=True)
-class Following:
-    """How late and how smooth a reading is against its second signal.
-
-    Attributes
-    ----------
-    blur : time constant by which it is smoother [s]
-    left : variance left unexplained with it [-]
-    usual_left : the same with the blur of the calibration [-]
-    lag : by how much it is later then [s]
-    """
-
-    blur: float
-    left: float
-    usual_left: float
-    lag: float
 
 
 def rows_of(
@@ -303,7 +269,7 @@ def predicted_by(relation: SecondSignalRelation, rows: Means) -> Floats:
     return np.asarray(rows.terms @ np.array(relation.coefficients))
 
 
-def line_of(reading: Floats, predicted: Floats) -> Line:
+def compare(reading: Floats, predicted: Floats) -> Comparison:
     """Fit a scale and a level of the reading against what a second signal shows.
 
     Parameters
@@ -312,33 +278,12 @@ def line_of(reading: Floats, predicted: Floats) -> Line:
 
     References
     ----------
-    Huber, Robust Statistics, 1981, ch. 7.
-    """
-    middle, columns = _columns(predicted)
-    scale, level = robust_fit(columns, reading)[0]
-    return Line(float(scale), float(level), middle)
-
-
-def _columns(predicted: Floats) -> tuple[float, Floats]:
-    middle = float(np.mean(predicted))
-    off = predicted - middle
-    return middle, np.column_stack([off, np.ones_like(off)])
-
-
-def compare(reading: Floats, predicted: Floats) -> Comparison:
-    """Fit the line of `line_of`, and how sure it is.
-
-    Parameters
-    ----------
-    reading, predicted : (m,) in the order of time
-
-    References
-    ----------
-    Standard deviations by leaving out one part of the
+    Huber, Robust Statistics, 1981, ch. 7. Standard deviations by leaving out one part of the
     drive after another (Efron, Stein, Ann. Statist. 9, 1981).
     """
-    line = line_of(reading, predicted)
-    _, columns = _columns(predicted)
+    middle = float(np.mean(predicted))
+    columns = np.column_stack([predicted - middle, np.ones_like(predicted)])
+    scale, level = robust_fit(columns, reading)[0]
     # Each is fitted anew: which of two clusters of rows is the outlier may depend on one part.
     size = -(-reading.size // BLOCKS)
     begin = (np.arange(BLOCKS) * (reading.size - size)) // (BLOCKS - 1)
@@ -347,23 +292,22 @@ def compare(reading: Floats, predicted: Floats) -> Comparison:
     left_out = robust_fits(columns[others], reading[others])[0]
     spread = (BLOCKS - 1) / BLOCKS * np.sum((left_out - np.mean(left_out, 0)) ** 2, 0)
     scale_std, level_std = np.sqrt(spread)
-    return Comparison(line.scale, line.level, line.predicted, float(scale_std), float(level_std))
+    return Comparison(float(scale), float(level), middle, float(scale_std), float(level_std))
 
 
-def follow(
+def lateness(
     rows: Rows, second_signal: SecondSignal, relation: SecondSignalRelation
-) -> Following | None:
-    """Find how late and how smooth the reading is against what the second signal shows.
+) -> float | None:
+    """Find how late the reading is against what the second signal shows [s].
 
     Parameters
     ----------
     rows, second signal
-    relation : of which the ranges and the blur are taken
+    relation : of which the ranges are taken
 
     Returns
     -------
-    Following
-        None where the signals are sampled too slowly, or the drive is too short.
+    One of `DELAYS`; None where the signals are sampled too slowly, or the drive is too short.
     """
     if rows.period > SLOW_PERIOD or np.count_nonzero(rows.driving) < 10 * FEWEST_MEANS:
         return None
@@ -372,23 +316,9 @@ def follow(
     predicted = terms(second_signal, value, turning, ranges_of(relation)) @ np.array(
         relation.coefficients
     )
-    period = float(np.median(np.diff(rows.time)))
-    reading = rows.reading[rows.driving]
     driven = rows.time[rows.driving]
-    left = np.empty((len(BLURS), len(DELAYS)))
-    for i, blur in enumerate(BLURS):
-        kept = float(np.exp(-period / blur)) if blur > 0.0 else 0.0
-        delayed = even_lag(predicted, kept, float(predicted[0]))
-        moved = (interpolate(driven - delay, rows.time, delayed) for delay in DELAYS)
-        left[i] = 1.0 - correlations(reading, moved) ** 2
-    best = int(np.argmin(left.min(axis=1)))
-    usual = int(np.argmin(np.abs(np.array(BLURS) - (relation.blur or 0.0))))
-    return Following(
-        blur=BLURS[best],
-        left=float(left[best].min()),
-        usual_left=float(left[usual].min()),
-        lag=DELAYS[int(np.argmin(left[usual]))],
-    )
+    moved = (interpolate(driven - delay, rows.time, predicted) for delay in DELAYS)
+    return DELAYS[int(np.argmax(np.square(correlations(rows.reading[rows.driving], moved))))]
 
 
 def air_of(drive: Drive, start: float, end: float) -> tuple[float, float]:

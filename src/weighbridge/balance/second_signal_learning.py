@@ -16,7 +16,7 @@ from weighbridge.balance.second_signal import (
     SecondSignal,
     air_of,
     compare,
-    follow,
+    lateness,
     means,
     ranges_of,
     rows_of,
@@ -146,7 +146,7 @@ def contradiction(
             if i == j or part.time.size < FEWEST_MEANS:
                 continue
             accepted = accepted_scales(source, relation, airs[j])
-            finding = judged(part, relation, accepted, (-np.inf, np.inf))
+            finding = judged(part, relation, accepted)
             if finding is not None and finding.verdict == "serious":
                 reading = source_of(vehicle).signals[0]
                 return Problem.of(
@@ -214,12 +214,5 @@ def learn(
         pressure=pressure,
         temperature=temperature,
     )
-    found_in = [f for r in rows if (f := follow(r, second_signal, relation)) is not None]
-    if not found_in:
-        return relation
-    return replace(
-        relation,
-        blur=float(np.median([f.blur for f in found_in])),
-        lag=float(np.median([f.lag for f in found_in])),
-        unexplained=max(float(np.median([f.left for f in found_in])), 1e-3),
-    )
+    lags = [lag for r in rows if (lag := lateness(r, second_signal, relation)) is not None]
+    return replace(relation, lag=float(np.median(lags))) if lags else relation

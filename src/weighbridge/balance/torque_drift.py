@@ -20,7 +20,7 @@ from weighbridge.messages import Problem, phrase, refused
 from weighbridge.navigation.motion import BY_SPEED, Motion
 from weighbridge.signals import Drive, Floats, Signal
 from weighbridge.signals.interpolation import interpolate
-from weighbridge.signals.robust import spread
+from weighbridge.signals.robust import median_of_three, median_slope, spread
 from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.torque import source_of
 
@@ -134,7 +134,7 @@ def smoothed_steps(
     slope, scatter = _line(before)
     reach = float(np.ptp(before.time)) if before.time.size else 0.0
     if abs(slope) * reach <= max(DRIFTS, SURE * scatter):
-        if before.lag.size >= FEWEST_PARTS and np.ptp(_median_of_three(before.lag)) > WANDERS:
+        if before.lag.size >= FEWEST_PARTS and np.ptp(median_of_three(before.lag)) > WANDERS:
             raise _wanders(drive, carrier, before)
         return drive, (), balance
     moved = carrier.time - slope * (carrier.time - before.time[0])
@@ -142,7 +142,7 @@ def smoothed_steps(
     corrected = drive.with_signals(Signal(carrier.name, moved[rising], carrier.values[rising]))
     balance = force_balance(corrected, vehicle, motion, delay=delay)
     after = force_lags(balance.table, vehicle, motion)
-    if after.lag.size >= FEWEST_PARTS and np.ptp(_median_of_three(after.lag)) > WANDERS:
+    if after.lag.size >= FEWEST_PARTS and np.ptp(median_of_three(after.lag)) > WANDERS:
         raise _wanders(drive, carrier, before)
     grows = phrase("later_and_later" if slope > 0.0 else "earlier_and_earlier")
     note = Problem.of(
@@ -160,12 +160,6 @@ def _line(found: ForceLags) -> tuple[float, float]:
     """Robust slope of the lag over time [-] and scatter of a piece about the line [s]."""
     if found.lag.size < FEWEST_PARTS:
         return 0.0, 0.0
-    i, j = np.triu_indices(found.lag.size, 1)
-    slope = float(np.median((found.lag[j] - found.lag[i]) / (found.time[j] - found.time[i])))
+    slope = median_slope(found.time, found.lag)
     left = found.lag - slope * found.time
     return slope, spread(left - np.median(left))
-
-
-def _median_of_three(y: Floats) -> Floats:
-    padded = np.concatenate((y[:1], y, y[-1:]))
-    return np.asarray(np.median([padded[:-2], padded[1:-1], padded[2:]], axis=0))

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 from scipy.optimize import lsq_linear
 
 from weighbridge.balance.law import ROAD_PARAMETERS, reading_columns, road_columns
 from weighbridge.balance.table import ForceTable
+from weighbridge.constants import INDEPENDENT
 from weighbridge.messages import refused
 from weighbridge.signals import Bools, Floats
 from weighbridge.signals.robust import huber, spread
-
-BLOCK: Final = 60.0
-"""Rows nearer than this share their errors [s]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,7 +34,7 @@ class TorqueRows:
     @property
     def block(self) -> Floats:
         """(n,) number of the block of dependent rows each row belongs to."""
-        return np.floor(self.time / BLOCK)
+        return np.floor(self.time / INDEPENDENT)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -118,7 +115,7 @@ def join_rows(parts: list[TorqueRows]) -> TorqueRows:
         first = float(part.time.min(initial=0.0))
         times.append(part.time - first + end)
         # Rows of two drives never share a block.
-        end = (np.floor(times[-1].max(initial=0.0) / BLOCK) + 2.0) * BLOCK
+        end = (np.floor(times[-1].max(initial=0.0) / INDEPENDENT) + 2.0) * INDEPENDENT
     return TorqueRows(
         design=np.vstack([p.design for p in parts]),
         target=np.concatenate([p.target for p in parts]),

@@ -20,7 +20,6 @@ from weighbridge.checks.engine import (
     check_friction,
     check_idle,
     check_torque_sign,
-    check_whole_torque,
 )
 from weighbridge.checks.frozen_imu import check_frozen, check_limit
 from weighbridge.checks.inertial import check_imu
@@ -29,8 +28,8 @@ from weighbridge.checks.second_signals import check_reading
 from weighbridge.checks.smoothed_imu import check_smoothed, without_smoothed
 from weighbridge.checks.speed import check_scales
 from weighbridge.checks.spikes import without_spikes
-from weighbridge.checks.travel import check_sign, check_standstill
-from weighbridge.checks.values import check_load, check_pressure, check_retarder, check_stuck
+from weighbridge.checks.travel import check_standstill
+from weighbridge.checks.values import check_load, check_retarder, check_stuck
 from weighbridge.checks.vehicle import check_vehicle
 from weighbridge.navigation.along import with_forward_accel
 from weighbridge.navigation.clock_drift import correct_clocks
@@ -50,14 +49,11 @@ _CHECKS: Final[tuple[_Check, ...]] = (
     check_limit,
     check_smoothed,
     check_load,
-    check_pressure,
     check_retarder,
-    check_whole_torque,
     check_torque_sign,
     check_friction,
     check_engine_speed,
     check_idle,
-    check_sign,
     check_standstill,
     check_scales,
     check_imu,

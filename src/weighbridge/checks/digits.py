@@ -1,4 +1,4 @@
-"""Digits of the accelerometer: too few of them, or cut off towards zero."""
+"""Digits of the accelerometer that are cut off towards zero."""
 
 from __future__ import annotations
 
@@ -9,10 +9,6 @@ import numpy as np
 from weighbridge.signals import Bools, Drive, Floats, Problem, Signal
 from weighbridge.signals.catalogue import IMU_SIGNALS
 from weighbridge.signals.robust import resolution
-
-COARSEST: Final = 0.22
-"""Larger steps of the accelerometer do not show whether digits are cut off [m/s^2], which at
-0.5 m/s^2 made a mass 81 % heavy; 8 bits of 2 g are 0.15 m/s^2."""
 
 COARSEST_CUT: Final = 0.12
 """Steps up to which half a digit corrects what was cut off [m/s^2]: it leaves 0.3 to 0.6 % of the
@@ -43,10 +39,6 @@ def with_half_digits(drive: Drive) -> Drive:
     step = float(np.median(list(steps.values()))) if steps else 0.0
     if step <= 0.0:
         return drive
-    if step > COARSEST:
-        return drive.with_problems(
-            Problem.of("imu.digits_coarse", "accel_x", step=step, serious=True)
-        )
     alike = [s for s in axes if abs(steps[s.name] / step - 1.0) < 0.01]
     moving: dict[int, Bools] = {}
     for s in alike:

@@ -35,17 +35,6 @@ _SIGN_FEWEST: Final = 30
 _AGAINST: Final = -0.5
 
 
-def check_whole_torque(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
-    """Question a torque in N m that looks like one in percent."""
-    s = drive.get("engine_torque")
-    if s is None or len(s) < 200:
-        return
-    low, high = float(np.min(s.values)), float(np.max(s.values))
-    whole = bool(np.all(np.abs(s.values - np.round(s.values)) < 1e-6))
-    if whole and low >= -40.0 and 60.0 <= high <= 100.0 and np.unique(s.values).size > 20:
-        yield Problem.of("torque.whole_percent", s.name, low=low, high=high)
-
-
 def check_torque_sign(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
     """Find a torque that runs against the motion it makes: its sign was turned."""
     speed = drive.speed

@@ -12,6 +12,7 @@ import numpy as np
 
 from weighbridge.signals import Bools, Drive, Floats, Signal
 from weighbridge.signals.runs import Runs, runs_of
+from weighbridge.vehicle.gear import SLIPS
 
 SHORTEST: Final[dict[str, float]] = {"engine_speed": 10.0, "vehicle_speed": 20.0}
 """Runs of one value below may be a steady drive [s]."""
@@ -51,8 +52,6 @@ REVS: Final = 1.3
 IN_GEAR: Final = 1.15
 """Highest over lowest vehicle speed that one engine speed does not outlast in gear [-]."""
 
-SLOWEST: Final = 3.0
-"""Below, clutch and converter slip [m/s]."""
 
 IDLING: Final = 1.25
 """Engine speed over that at standstill below which it may idle on its own [-]."""
@@ -110,7 +109,7 @@ def _impossible(drive: Drive, signal: Signal, part: slice, levels: frozenset[flo
         return _speed_frozen(drive, grid, value)
     speed = _speed(drive, grid)
     if signal.name == "engine_speed":
-        moving = speed[speed > SLOWEST]
+        moving = speed[speed > SLIPS]
         idle = _idle(drive, signal)
         return bool(
             value > IDLING * idle and moving.size >= 5 and moving.max() > IN_GEAR * moving.min()
@@ -128,9 +127,9 @@ def _impossible(drive: Drive, signal: Signal, part: slice, levels: frozenset[flo
         low, high, reach = EXTREME
         return bool(accel.min() < low and accel.max() > high and np.ptp(speed[known]) > reach)
     engine = _of(drive, "engine_speed", grid)
-    engine = engine[(engine > 30.0) & (speed > SLOWEST)]
+    engine = engine[(engine > 30.0) & (speed > SLIPS)]
     revs = engine.size >= 5 and engine.max() > REVS * engine.min()
-    return bool((np.ptp(accel) > VARIES or revs) and np.nanmax(speed) > SLOWEST)
+    return bool((np.ptp(accel) > VARIES or revs) and np.nanmax(speed) > SLIPS)
 
 
 def _speed_frozen(drive: Drive, grid: Floats, value: float) -> bool:
@@ -140,7 +139,7 @@ def _speed_frozen(drive: Drive, grid: Floats, value: float) -> bool:
         return bool(np.ptp(ground) > APART and np.max(np.abs(ground - value)) > APART)
     engine = _of(drive, "engine_speed", grid)
     engine = engine[engine > 30.0]
-    return bool(value > SLOWEST and engine.size >= 5 and engine.max() > SHIFTED * engine.min())
+    return bool(value > SLIPS and engine.size >= 5 and engine.max() > SHIFTED * engine.min())
 
 
 def _speed(drive: Drive, at: Floats) -> Floats:

@@ -7,20 +7,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import replace
-from itertools import pairwise
 from typing import Final
 
 import numpy as np
 
 from weighbridge.checks import windows
 from weighbridge.constants import GRAVITY
-from weighbridge.messages import phrase
-from weighbridge.navigation.dropouts import rare_spikes
 from weighbridge.navigation.frozen import without_frozen
 from weighbridge.signals import Bools, Drive, Floats, Problem, Signal
 from weighbridge.signals.catalogue import IMU_SIGNALS
-from weighbridge.signals.instants import span
 from weighbridge.signals.robust import resolution
 from weighbridge.vehicle.model import Vehicle
 
@@ -47,14 +42,11 @@ _COARSE_RATE: Final = 0.015
 
 # Specific force per change of speed above which the speed is in another unit [-].
 _STEEPEST: Final = 1.3
-# Parts of a drive that are looked at alone, and their least length [s].
-_PARTS: Final = 3
-_PART: Final = 300.0
 
 
 def check_imu(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
     """Compare the inertial sensor with gravity, with the course and with itself."""
-    drive = _without_spikes(without_frozen(drive, IMU_SIGNALS))
+    drive = without_frozen(drive, IMU_SIGNALS)
     accel = _axes(drive, "accel")
     gyro = _axes(drive, "gyro")
     if gyro is not None and not any(np.ptp(s.values) > 0.0 for s in gyro):
@@ -70,38 +62,7 @@ def check_imu(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
             yield problem
     if not fine or accel is None or gyro is None:
         return
-    found = list(_check_axes(drive, accel, gyro))
-    yield from found or _check_parts(drive)
-
-
-def _without_spikes(drive: Drive) -> Drive:
-    """Leave out what navigation leaves out too: a few false samples are no other unit."""
-    kept = []
-    for name in IMU_SIGNALS:
-        s = drive.get(name)
-        if s is None or not (false := rare_spikes(s.values, name.partition("_")[0])).any():
-            continue
-        kept.append(Signal(name, s.time[~false], s.values[~false]))
-    return drive.with_signals(*kept) if kept else drive
-
-
-def _check_parts(drive: Drive) -> Iterator[Problem]:
-    """Find axes that were swapped or reversed on the way: what the whole drive hides."""
-    edges = np.linspace(drive.start, drive.end, _PARTS + 1)
-    for start, end in pairwise(edges) if drive.duration > _PARTS * _PART else ():
-        part = drive.between(float(start), float(end))
-        accel, gyro = _axes(part, "accel"), _axes(part, "gyro")
-        if accel is None or gyro is None:
-            continue
-        for problem in _check_axes(part, accel, gyro):
-            when = phrase("in_part", span=span(round(start), round(end)), text=problem.text)
-            yield replace(
-                problem,
-                start=float(start),
-                end=float(end),
-                text=phrase("or_cut", text=when) if problem.serious else when,
-            )
-            return
+    yield from _check_axes(drive, accel, gyro)
 
 
 def _axes(drive: Drive, kind: str) -> tuple[Signal, Signal, Signal] | None:
@@ -135,7 +96,7 @@ def _check_gravity(accel: tuple[Signal, Signal, Signal]) -> Iterator[Problem]:
 
 def _check_rate(drive: Drive, gyro: tuple[Signal, Signal, Signal]) -> Iterator[Problem]:
     norm = _norm(gyro)
-    high = float(np.percentile(norm, 99.9)) if norm.size else 0.0
+    high = float(np.percentile(norm, 99.0)) if norm.size else 0.0
     if high > 4.0:
         yield Problem.of("imu.gyro_degrees", "gyro_x", serious=True, high=high)
         return

@@ -3,18 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import pairwise
-from typing import Any
-
-import numpy as np
 
 from weighbridge.balance.disagreement import QUESTIONABLE, Finding, difference, findings
 from weighbridge.balance.second_signal import BY_SIGNAL
-from weighbridge.checks.frozen import frozen
 from weighbridge.checks.steps import check_steps
 from weighbridge.messages import phrase
-from weighbridge.signals import Drive, Problem, Signal
-from weighbridge.signals.instants import instant
+from weighbridge.signals import Drive, Problem
 from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.torque import source_of
 
@@ -38,7 +32,7 @@ def compared(drive: Drive, vehicle: Vehicle | None) -> tuple[Finding, ...]:
     """What the second signals of a vehicle file say of the reading; nothing without any."""
     if vehicle is None or not vehicle.witnesses:
         return ()
-    return findings(_without_frozen(drive, vehicle), vehicle)
+    return findings(drive, vehicle)
 
 
 def check_second_signals(
@@ -72,31 +66,14 @@ def check_second_signals(
     agree = [
         f.signal for f in found if f.verdict == "agrees" and abs(f.scale - 1.0) <= QUESTIONABLE
     ]
-    if agree and not _outvoted(off):
+    if agree:
         return tuple(_second_signal_off(reading, f, agree) for f in off)
     if not off:
         return ()
     worst = max(off, key=lambda f: (f.verdict == "serious", abs(f.scale - 1.0)))
-    together = [f for f in off if (f.blur > 0.0, f.sign) == (worst.blur > 0.0, worst.sign)]
+    together = [f for f in off if f.sign == worst.sign]
     serious = (altered or worst.verdict == "serious") and reading not in drive.info.trusted
     return (_reading_off(reading, vehicle, worst, together, len(off), serious=serious),)
-
-
-def _without_frozen(drive: Drive, vehicle: Vehicle) -> Drive:
-    """Leave out where a second signal froze: it shows nothing there."""
-    for name in {n for relation in vehicle.witnesses for n in BY_SIGNAL[relation.signal].needs}:
-        signal = drive.get(name)
-        marked = frozen(drive, name) if signal is not None else None
-        if signal is not None and marked is not None and marked.any() and not marked.all():
-            kept = Signal(name, signal.time[~marked], signal.values[~marked])
-            drive = drive.with_signals(kept)
-    return drive
-
-
-def _outvoted(off: Sequence[Finding]) -> bool:
-    """Say whether two second signals are off by the same: then it is the reading."""
-    scales = sorted(f.scale for f in off if f.scaled and f.blur == 0.0 and not _part(f))
-    return any(b - a < QUESTIONABLE for a, b in pairwise(scales))
 
 
 def _reading_off(
@@ -110,17 +87,6 @@ def _reading_off(
 ) -> Problem:
     """Say by how much the reading is off, by which second signals, and what to do."""
     names = " and ".join(f.signal for f in together)
-    at = _span(worst)
-    if worst.blur > 0.0:
-        return Problem.of(
-            "torque.blurred",
-            reading,
-            **at,
-            serious=serious,
-            witnesses=names,
-            blur=worst.blur,
-            vehicle=vehicle.name,
-        )
     turning = any(BY_SIGNAL[f.signal].per_turn for f in together)
     if len(together) > 1:
         which = phrase("reading_wrong", reading=reading)
@@ -128,60 +94,32 @@ def _reading_off(
         which = phrase("one_witness_wrong")
     else:
         which = phrase("one_of_three_wrong" if turning else "one_of_two_wrong")
-    if worst.before:
-        source = phrase("against_before", at=instant(worst.start))
-    else:
-        source = phrase("by_calibration", vehicle=vehicle.name, when=_when(worst))
     return Problem.of(
         "torque.witness",
         reading,
-        **at,
         serious=serious,
         by=difference(worst),
         scale=worst.scale,
         than="as" if worst.scaled else "than",
         witnesses=names,
         verb="shows" if len(together) == 1 else "show",
-        source=source,
+        source=phrase("by_calibration", vehicle=vehicle.name),
         which=which,
-        two=phrase("or_two_vehicles") if _part(worst) else "",
     )
 
 
 def _second_signal_off(reading: str, finding: Finding, agree: Sequence[str]) -> Problem:
-    if finding.blur > 0.0:
-        how = phrase("follows_it", reading=reading, blur=finding.blur)
-    else:
-        how = phrase(
-            "reads_than_it",
-            reading=reading,
-            by=difference(finding),
-            than="as" if finding.scaled else "than",
-            when=_when(finding),
-        )
+    how = phrase(
+        "reads_than_it",
+        reading=reading,
+        by=difference(finding),
+        than="as" if finding.scaled else "than",
+    )
     return Problem.of(
         "witness.off",
         finding.signal,
-        **_span(finding),
         how=how,
         agree=" and ".join(agree),
         verb="agrees" if len(agree) == 1 else "agree",
         reading=reading,
     )
-
-
-def _span(finding: Finding) -> dict[str, Any]:
-    """Where in the drive a second signal is off [s]; nothing where all the time."""
-    edges = {"start": finding.start, "end": finding.end}
-    return {name: edge for name, edge in edges.items() if np.isfinite(edge)}
-
-
-def _part(finding: Finding) -> bool:
-    return bool(np.isfinite(finding.start) or np.isfinite(finding.end))
-
-
-def _when(finding: Finding) -> str:
-    """In which part of the drive, in words."""
-    if np.isfinite(finding.start):
-        return phrase("from_on", at=instant(finding.start))
-    return phrase("until", at=instant(finding.end)) if np.isfinite(finding.end) else ""

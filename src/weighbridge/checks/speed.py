@@ -13,9 +13,8 @@ from typing import Final
 import numpy as np
 
 from weighbridge.checks import windows
-from weighbridge.constants import GRAVITY
 from weighbridge.messages import phrase
-from weighbridge.signals import Bools, Drive, Floats, Problem, Signal
+from weighbridge.signals import Drive, Floats, Problem, Signal
 from weighbridge.signals.instants import instant
 from weighbridge.signals.parts import find_splices
 from weighbridge.signals.units import UNITS
@@ -66,7 +65,6 @@ def check_scales(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
         ):
             yield problem
             gnss = None
-    yield from _check_altitude(drive)
     speed = drive.get("vehicle_speed")
     if speed is None or len(speed) < 20:
         if gnss is not None and trusted is None:
@@ -289,59 +287,6 @@ def _swapped(lat: Signal, lon: Signal) -> Problem:
         latitude=np.degrees(np.median(lat.values)),
         longitude=np.degrees(np.median(lon.values)),
     )
-
-
-def _check_altitude(drive: Drive) -> Iterator[Problem]:
-    """Find feet for metres: by roads too steep, or by the accelerometer along the vehicle."""
-    altitude = drive.get("altitude")
-    speed = drive.speed
-    if altitude is None or speed is None or len(altitude) < 20 or len(speed) < 20:
-        return
-    length = 20.0
-    start = max(float(altitude.time[0]), float(speed.time[0]))
-    end = min(float(altitude.time[-1]), float(speed.time[-1]))
-    if end - start < 30 * length:
-        return
-    at = windows.edges(start, end, length)
-    v, full = windows.means(speed, at)
-    full &= (v > 5.0) & (altitude.age(at) < 3.0)[1:] & (altitude.age(at) < 3.0)[:-1]
-    full &= np.isfinite(altitude.at(at))[1:] & np.isfinite(altitude.at(at))[:-1]
-    if np.count_nonzero(full) < 20:
-        return
-    grade = np.where(full, np.diff(altitude.at(at)) / np.maximum(v * length, 1.0), 0.0)
-    steep = float(np.percentile(np.abs(grade[full]), 95))
-    ratio = _grade_ratio(drive, speed, at, grade, full)
-    said = drive.units.get("altitude")
-    if steep > 0.2:
-        # Where an accelerometer sees the grade, the height does not make the mass.
-        alone = not drive.has("longitudinal_accel") and not drive.has("accel_x", "gyro_x")
-        remedy = phrase("altitude_none", unit=said) if said == "ft" else phrase("altitude_feet")
-        yield Problem.of(
-            "altitude.steep", "altitude", serious=alone, steep=100 * steep, remedy=remedy
-        )
-    elif ratio is not None and abs(np.log(ratio / UNITS["ft"].factor)) < 0.2:
-        remedy = phrase("altitude_feet")
-        if said == "ft":
-            remedy = phrase("altitude_factor", unit=said, factor=ratio)
-        yield Problem.of("altitude.feet", "altitude", ratio=1.0 / ratio, remedy=remedy)
-
-
-def _grade_ratio(
-    drive: Drive, speed: Signal, at: Floats, grade: Floats, full: Bools
-) -> float | None:
-    """Grade by the accelerometer over grade by height; None where they do not agree in shape."""
-    accel = drive.get("longitudinal_accel")
-    if accel is None or len(accel) < 20:
-        return None
-    force, ok = windows.means(accel, at)
-    seen = (force - np.diff(speed.at(at)) / np.diff(at)) / GRAVITY
-    ok &= full & np.isfinite(seen)
-    pairs = ok[1:] & ok[:-1]
-    x, y = np.diff(grade)[pairs], np.diff(seen)[pairs]
-    if x.size < 20 or float(np.std(x)) < 0.004:
-        return None
-    alike = float(np.corrcoef(x, y)[0, 1]) > 0.8
-    return float(np.std(y) / np.std(x)) if alike else None
 
 
 def _gear_ratio(drive: Drive, speed: Signal, vehicle: Vehicle | None) -> float | None:

@@ -7,14 +7,13 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from weighbridge.checks.needed import show
+from weighbridge.checks.ranges import FEW
 from weighbridge.signals import Bools, Drive, Floats, Problem, Signal
 from weighbridge.signals.instants import instant
 
-FEW: Final = 0.01
-"""Part of the samples up to which spikes are few; at least one [-]."""
-
 FEW_ZEROS: Final = 0.1
-"""The same of zeros, which a bus or a reader writes where it has no value [-]."""
+"""Part of the samples up to which zeros are few [-]; a bus writes them where it has no value.
+"""
 
 LONGEST: Final = 3
 """Samples of a spike at most."""

@@ -14,6 +14,7 @@ from weighbridge.messages import phrase
 from weighbridge.signals import Drive, Floats, Problem
 from weighbridge.signals.instants import span
 from weighbridge.signals.robust import resolution
+from weighbridge.signals.units import UNITS
 from weighbridge.vehicle.model import Vehicle
 
 SAME: Final = 0.003
@@ -45,9 +46,6 @@ IN_A_ROW: Final = 2
 MATTERS: Final = 0.03
 """A factor farther from one moves a mass by more than weighing is worth [-]: there is no mass
 then, unless a second signal of the torque agrees with the reading."""
-
-POUND_FOOT: Final = 1.35581795
-"""A pound-foot [N m]."""
 
 
 def reading_step(values: Floats) -> float:
@@ -143,8 +141,8 @@ def _on_steps(values: Floats, step: float, fewest: int = FEWEST) -> float:
 
 def _unit(ratio: float) -> str:
     """Which unit a torque is in or is taken for, in words; empty where it is none."""
-    if abs(ratio * POUND_FOOT - 1.0) < SAME:
+    if abs(ratio * UNITS["lbft"].factor - 1.0) < SAME:
         return phrase("as_pound_feet")
-    if abs(ratio / POUND_FOOT - 1.0) < SAME:
+    if abs(ratio / UNITS["lbft"].factor - 1.0) < SAME:
         return phrase("as_newton_metres")
     return ""

@@ -108,16 +108,3 @@ def _longest_time(s: Signal, mask: Bools) -> tuple[float, float]:
     lengths = s.time[ends - 1] - s.time[starts]
     k = int(np.argmax(lengths))
     return float(lengths[k]), float(s.time[starts[k]])
-
-
-def check_sign(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
-    """Find a speed counted backwards."""
-    s = drive.get("vehicle_speed")
-    if s is None:
-        return
-    moving = np.abs(s.values) > 1.0
-    backwards = int(np.count_nonzero(s.values[moving] < 0.0))
-    if backwards > 0.5 * np.count_nonzero(moving):
-        yield Problem.of(
-            "speed.sign", s.name, serious=True, count=backwards, samples=np.count_nonzero(moving)
-        )

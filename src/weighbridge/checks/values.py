@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import permutations
 from typing import Final
 
 import numpy as np
 
 from weighbridge.checks.needed import MOTION, moves, needed, of_torque, show
-from weighbridge.messages import phrase
 from weighbridge.signals import QUANTITIES, Drive, Problem
 from weighbridge.signals.catalogue import IMU_SIGNALS
-from weighbridge.signals.units import UNITS
 from weighbridge.vehicle.model import Vehicle
 
 _PERCENT: Final = (
@@ -94,31 +91,4 @@ def check_retarder(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
         return
     yield Problem.of(
         "retarder.sign", s.name, serious=True, value=show(s.name, float(np.max(s.values)))
-    )
-
-
-def check_pressure(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
-    """Find a barometer in another unit: drag goes with the air's density."""
-    s = drive.get("barometric_pressure")
-    if s is None or not len(s):
-        return
-    usual = float(np.median(s.values))
-    q = QUANTITIES[s.name]
-    if q.low <= usual <= q.high:
-        return
-    swapped = next(
-        (
-            (said, meant)
-            for said, meant in permutations(("pa", "hpa", "kpa"), 2)
-            if q.low <= usual * UNITS[meant].factor / UNITS[said].factor <= q.high
-        ),
-        None,
-    )
-    remedy = (
-        phrase("pressure_unit", unit=swapped[1], said=swapped[0], column=q.stem)
-        if swapped
-        else phrase("pressure_check")
-    )
-    yield Problem.of(
-        "range.pressure", s.name, serious=True, value=show(s.name, usual), remedy=remedy
     )

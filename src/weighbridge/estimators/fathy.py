@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from weighbridge.balance import ForceBalance
+from weighbridge.constants import INDEPENDENT
 from weighbridge.errors import ConfigError
 from weighbridge.estimators.judging import nothing
-from weighbridge.estimators.rls import BLOCK, jackknife
+from weighbridge.estimators.rls import jackknife
 from weighbridge.estimators.track import MassTrack
 from weighbridge.estimators.unmeasured_grade import (
     FEWEST_ROWS,
@@ -98,6 +99,6 @@ def estimate(
         rows,
         settings,
         running=running,
-        running_std=np.full(running.size, mass_of(slice(0, running.size), BLOCK)[1]),
+        running_std=np.full(running.size, mass_of(slice(0, running.size), INDEPENDENT)[1]),
         mass_of=mass_of,
     )

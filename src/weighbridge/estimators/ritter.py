@@ -8,9 +8,9 @@ import numpy as np
 from scipy.linalg import solveh_banded
 
 from weighbridge.balance import ForceBalance
-from weighbridge.constants import GRAVITY
+from weighbridge.constants import GRAVITY, INDEPENDENT
 from weighbridge.estimators.judging import nothing
-from weighbridge.estimators.rls import BLOCK, jackknife
+from weighbridge.estimators.rls import jackknife
 from weighbridge.estimators.track import MassTrack
 from weighbridge.estimators.unmeasured_grade import (
     FEWEST_ROWS,
@@ -91,7 +91,7 @@ def estimate(
         rows,
         settings,
         running=running,
-        running_std=np.full(running.size, mass_of(slice(0, running.size), BLOCK)[1]),
+        running_std=np.full(running.size, mass_of(slice(0, running.size), INDEPENDENT)[1]),
         mass_of=mass_of,
     )
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from weighbridge.balance import ForceBalance, Reason, force_balance
 from weighbridge.balance.table import ForceTable
+from weighbridge.constants import INDEPENDENT
 from weighbridge.errors import ConfigError
 from weighbridge.estimators.fit_std import Fitted, judged
 from weighbridge.estimators.gate import GateSettings
@@ -23,9 +24,6 @@ from weighbridge.navigation.printed import PrintedFilterSettings, mounting_of, p
 from weighbridge.signals import Bools, Drive, Floats, Ints
 from weighbridge.signals.robust import spread
 from weighbridge.vehicle.model import Vehicle
-
-BLOCK: Final = 60.0
-"""Rows nearer than this share wind, grade and torque errors [s]."""
 
 NOISE_SHARE: Final = 2.0
 """What noise of the motion costs, see `weighbridge.estimators.noisy_motion.row_noise_std` [-]."""
@@ -104,7 +102,7 @@ def parameters(settings: RlsSettings, period: float) -> kernel.RlsParams:
         gate=settings.gate,
         scale_rows=400.0,
         settle_rows=settings.settle_rows,
-        block=BLOCK,
+        block=INDEPENDENT,
     )
 
 
@@ -215,7 +213,7 @@ def run_in_turn(
         phi, y, row_reason = _rows(balance, vehicle, settings)
         # Times go on as well: blocks of dependent rows end with them.
         time = table.time - table.time[0] + end
-        end = float(time[-1]) + BLOCK
+        end = float(time[-1]) + INDEPENDENT
         state, theta, *_ = kernel.run(
             state, time, phi[:, None], y, row_reason == 0, parameters(settings, _period(table))
         )
@@ -251,7 +249,7 @@ def _period(table: ForceTable) -> float:
 
 
 def block_jackknife(
-    time: Floats, phi: Floats, y: Floats, used: Bools, block: float = BLOCK
+    time: Floats, phi: Floats, y: Floats, used: Bools, block: float = INDEPENDENT
 ) -> tuple[float, float, int]:
     """Least squares of ``y`` on ``phi`` and its standard deviation by blocks of time.
 

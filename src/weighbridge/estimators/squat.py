@@ -11,7 +11,7 @@ from scipy.ndimage import uniform_filter1d
 
 from weighbridge.balance import ForceBalance
 from weighbridge.balance.law import squat_column
-from weighbridge.constants import GRAVITY
+from weighbridge.constants import GRAVITY, INDEPENDENT
 from weighbridge.messages import Problem, phrase
 from weighbridge.navigation.motion import BY_SPEED, Motion, with_squat
 from weighbridge.signals import Bools, Floats
@@ -55,8 +55,6 @@ BRIEF: Final = 10.0
 LEAST_ACCEL: Final = 0.15
 """Standard deviation of what is left that is needed [m/s^2]."""
 
-BLOCK: Final = 60.0
-"""Stretches of this length show how much the slope scatters [s]."""
 
 FEWEST_BLOCKS: Final = 4
 
@@ -206,7 +204,7 @@ def squat_by_speed(motion: Motion) -> tuple[float, float] | None:
         for x in (motion.specific_force, np.gradient(motion.speed, 1.0 / rate))
     ]
     inside = uniform_filter1d(moving.astype(np.float64), around[1]) > 0.999
-    block = (motion.time[inside] // BLOCK).astype(np.int64)
+    block = (motion.time[inside] // INDEPENDENT).astype(np.int64)
     read, rolled = (x[inside] for x in parts)
     _, block = np.unique(block, return_inverse=True)
     if block.size == 0 or block.max() < FEWEST_BLOCKS:

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from weighbridge.balance import ForceBalance, Reason
 from weighbridge.balance.law import force_on_mass, mass_column
+from weighbridge.constants import INDEPENDENT
 from weighbridge.estimators.fit_std import Fitted, judged
 from weighbridge.estimators.gate import GateSettings
 from weighbridge.estimators.judging import consider_std, converged_at, nothing, segments
-from weighbridge.estimators.rls import BLOCK
 from weighbridge.estimators.track import MassTrack
 from weighbridge.signals import Floats, Ints
 from weighbridge.vehicle.model import Vehicle
@@ -79,7 +79,7 @@ def settled_rows(
     return Rows(table.time, force, table.accel, reason, index)
 
 
-def blocks_of(time: Floats, length: float = BLOCK) -> Ints:
+def blocks_of(time: Floats, length: float = INDEPENDENT) -> Ints:
     """Return the number of the block of each row (n,)."""
     return np.asarray((time - time[0]) // length, dtype=np.int64)
 
@@ -109,7 +109,7 @@ def finish(
     table = balance.table
     used = rows.reason == Reason.USED
     phi = mass_column(table, vehicle)
-    mass, scatter, blocks = mass_of(slice(0, table.time.size), BLOCK)
+    mass, scatter, blocks = mass_of(slice(0, table.time.size), INDEPENDENT)
     if not (np.isfinite(mass) and mass > 0.0):
         return nothing(method, balance, vehicle, rows.reason, blocks, settings)
     slow = consider_std(balance, phi, used, vehicle)

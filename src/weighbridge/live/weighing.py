@@ -10,7 +10,7 @@ from typing import Any, Final, Literal
 from scipy.special import ndtr, ndtri
 
 from weighbridge.arguments import check_number
-from weighbridge.messages import Problem
+from weighbridge.messages import Explained, Problem
 from weighbridge.results.writing import check_level
 
 Side = Literal["above", "below"]
@@ -90,7 +90,7 @@ class AlertState:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class LiveWeighing:
+class LiveWeighing(Explained):
     """The mass at one moment of a drive, its uncertainty, and what would reduce it.
 
     Attributes
@@ -150,19 +150,9 @@ class LiveWeighing:
     problems: tuple[Problem, ...] = ()
 
     @property
-    def reason(self) -> str:
-        """Why the status is not ``weighed``, one sentence; empty if it is."""
-        return "" if self.refusal is None else self.refusal.text
-
-    @property
-    def reason_id(self) -> str | None:
-        """Id of that sentence; None if the status is ``weighed``."""
-        return None if self.refusal is None else self.refusal.id
-
-    @property
     def notes(self) -> tuple[str, ...]:
         """Texts of the `problems`."""
-        return tuple(p.text for p in self.problems)
+        return self.warnings
 
     def interval(self, level: float = 0.95) -> tuple[float, float]:
         """Interval that holds the mass with probability ``level``, between 0 and 1 [kg]."""

@@ -10,7 +10,7 @@ import numpy as np
 from weighbridge.kernels.lowpass import lowpass_resample
 from weighbridge.messages import refused
 from weighbridge.navigation.axes import Axes
-from weighbridge.navigation.dropouts import false_rows, repeated_rows
+from weighbridge.navigation.dropouts import false_rows
 from weighbridge.navigation.frozen import without_frozen
 from weighbridge.navigation.geodesy import LocalFrame
 from weighbridge.signals import Bools, Drive, Floats, Signal
@@ -113,14 +113,9 @@ def read_imu(drive: Drive) -> Imu:
         moving = np.interp(time, speed.time, speed.values) > _MOVES
     usual = signals[0].period if whole else float(np.median(np.diff(time)))
     imu = Imu(time, accel, gyro, usual)
-    repeated = repeated_rows(imu.accel, imu.gyro, moving)
-    own = time[moving & ~repeated]
-    if repeated.any() and own.size >= _FEWEST:
-        imu = _kept(imu, ~repeated, float(np.median(np.diff(own))))
-        moving = moving[~repeated]
     if imu.period > _SLOWEST:
         raise refused("imu.slow", drive=drive.name, period=imu.period)
-    false = false_rows(imu.accel, imu.gyro, moving, imu.period)
+    false = false_rows(imu.accel, imu.gyro, moving)
     if not false.any() or time[-1] - time[0] < _BRIEF:
         return imu
     if np.count_nonzero(~false) < _FEWEST:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
@@ -20,9 +20,8 @@ from weighbridge.navigation.clock_lag import (
 )
 from weighbridge.navigation.frozen import without_frozen
 from weighbridge.signals import QUANTITIES, Bools, Drive, Floats, Problem, Signal
-from weighbridge.signals.instants import instant, span
-from weighbridge.signals.robust import huber, spread
-from weighbridge.signals.runs import marked_runs
+from weighbridge.signals.instants import instant
+from weighbridge.signals.robust import huber, median_of_three, median_slope, spread
 
 _LOG = logging.getLogger(__name__)
 
@@ -40,10 +39,6 @@ _STEP: Final = 0.4
 _MOST_STEPS: Final = 4
 # A piece so far off its neighbour holds both sides of a step [s].
 _MIXED: Final = 0.12
-# Pieces from which on most must show a lag, and how many do [-]. Of those of 33 recorded and 15
-# simulated drives 0.94 and more do, with a speed in steps of 5 km/h 0.25 of a truck's.
-_ENOUGH: Final = 6
-_AGREES: Final = 0.2
 # Clocks are looked at again once they were moved; so often at most.
 _ROUNDS: Final = 4
 # Pieces that must show a lag, and lie on what is corrected [-].
@@ -61,13 +56,6 @@ _OWN: Final = (-1.0, 2.0)
 _BEGUN: Final = (-0.3, 0.8)
 # Two tables that drift alike against the third: it is the third whose clock is wrong [s].
 _ALIKE: Final = 0.15
-# Vehicle speed and speed over ground agree to within so much [m/s] and [-], at so many instants
-# [-], while they range over so much [m/s]: then it is the accelerometer that fits neither.
-_SPEEDS_APART: Final = (1.0, 0.1)
-_SPEEDS_AGREE: Final = 0.8
-_SPEEDS_RANGE: Final = 3.0
-# Part of such times in which both must be known [-].
-_SEEN: Final = 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,9 +125,6 @@ def _round(drive: Drive) -> Drive:
         if speed is None or len(speed) < 50:
             continue
         lags = _lags(force, speed)
-        lost = _lost(lags) if table == "obd" else ()
-        if lost:
-            return _left_out(drive, lost)
         path = _judged(lags, table)
         if isinstance(path, Problem):
             return drive.with_problems(path)
@@ -188,21 +173,16 @@ def _lags(force: Integrated, speed: Signal) -> Lags:
 
 def _judged(lags: Lags, table: str) -> _Path | Problem | None:
     """Say how a table is to be moved, that it cannot be, or None where its clock is sound."""
-    if table == "obd" and lags.pieces >= _ENOUGH and _strangers(lags):
-        return Problem.of("clock.erratic", serious=True, found=lags.lag.size, pieces=lags.pieces)
     if lags.lag.size < _FEWEST:
         return None
-    lone = _lone(lags.lag)
-    time, lag = lags.time[~lone], lags.lag[~lone]
-    if lag.size < _FEWEST:
-        return None
+    time, lag = lags.time, lags.lag
     # By second differences, so that neither drift nor step counts as scatter.
     scatter = max(spread(np.diff(lag, 2)) / np.sqrt(6.0), float(np.median(lags.std)))
     slope, slope_std, fit = _line(time, lag, scatter)
     length = float(time[-1] - time[0])
     drifts = abs(slope) * length > _DRIFT and abs(slope) > _SURE * slope_std
     allowed = _WANDER + 4.0 * scatter
-    wanders = float(np.ptp(_median_of_three(lag))) > allowed
+    wanders = float(np.ptp(median_of_three(lag))) > allowed
     apart = not _OWN[0] < float(np.median(lag)) < _OWN[1]
     if not (drifts or wanders or apart):
         return None
@@ -212,7 +192,7 @@ def _judged(lags: Lags, table: str) -> _Path | Problem | None:
     # In a piece of a clock that drifts fast the lag is less sure; the next round sees to the rest.
     more = _BLUR * abs(slope)
     follows = float(np.mean(np.abs(lag - fit) < _NEAR + more)) >= _FOLLOWS
-    if follows and np.ptp(_median_of_three(lag - fit)) <= allowed + 2.0 * more:
+    if follows and np.ptp(median_of_three(lag - fit)) <= allowed + 2.0 * more:
         slope = slope if drifts else 0.0
         knots = time[[0, -1]]
         text = phrase("clock_drifts", slope=1e6 * slope) if drifts else ""
@@ -220,32 +200,9 @@ def _judged(lags: Lags, table: str) -> _Path | Problem | None:
     return _broken(time, lag, table)
 
 
-def _strangers(lags: Lags) -> bool:
-    """Say whether hardly a piece shows a lag, or each another one."""
-    few = lags.lag.size < _AGREES * lags.pieces
-    return few or (lags.lag.size > 2 and float(np.median(np.abs(np.diff(lags.lag, 2)))) > _STEP)
-
-
-def _lost(lags: Lags) -> tuple[tuple[float, float], ...]:
-    """Times in which no piece shows a lag, though nearly all others do [s]."""
-    if lags.lag.size < _FEWEST:
-        return ()
-    time = np.concatenate((lags.time, lags.missed))
-    order = np.argsort(time)
-    time, shown = time[order], (np.arange(time.size) < lags.lag.size)[order]
-    runs = [(a, b) for a, b in zip(*marked_runs(~shown), strict=True) if b - a >= _FEWEST]
-    others = time.size - sum(b - a for a, b in runs)
-    if not runs or lags.lag.size < _FOLLOWS * others:
-        return ()
-    return tuple(
-        (float(time[a - 1]) if a else -np.inf, float(time[b]) if b < time.size else np.inf)
-        for a, b in runs
-    )
-
-
 def _broken(time: Floats, lag: Floats, table: str) -> _Path | Problem | None:
     """Follow a lag that changes by steps, or slowly but not evenly."""
-    level_lag = _median_of_three(lag)
+    level_lag = median_of_three(lag)
     jumps = np.flatnonzero(np.abs(np.diff(level_lag)) > _STEP)
     # One step shows as two or three where a piece holds both sides of it.
     groups = np.split(jumps, np.flatnonzero(np.diff(jumps) > 2) + 1) if jumps.size else []
@@ -261,7 +218,7 @@ def _broken(time: Floats, lag: Floats, table: str) -> _Path | Problem | None:
     time, lag = time[~blended], lag[~blended]
     ends = [float(b) for _, b in cuts]
     parts = np.split(np.arange(lag.size), np.searchsorted(time, ends))
-    level = np.concatenate([_median_of_three(lag[p]) for p in parts])
+    level = np.concatenate([median_of_three(lag[p]) for p in parts])
     follows = np.count_nonzero(np.abs(lag - level) < _NEAR) + np.count_nonzero(blended)
     if len(cuts) > _MOST_STEPS or follows < _FOLLOWS * blended.size:
         return _hopeless(table, phrase("clocks_jump")) if table == "obd" else None
@@ -276,47 +233,10 @@ def _hopeless(table: str, why: str) -> Problem:
     return Problem.of("clock.hopeless", serious=True, table=table, why=why)
 
 
-def _left_out(drive: Drive, lost: tuple[tuple[float, float], ...]) -> Drive:
-    """Leave out what is false where vehicle speed and accelerometer do not fit at all.
-
-    It is the accelerometer where GNSS agrees with the vehicle speed, and the rows of the bus where
-    it does not. Without GNSS it may be either.
-    """
-    first, last = drive.start, drive.end
-    text = " and ".join(span(round(max(a, first)), round(min(b, last))) for a, b in lost)
-    agree = _speeds_agree(drive, lost)
-    edges: dict[str, Any] = {"start": max(lost[0][0], first), "end": min(lost[-1][1], last)}
-    if agree is not None:
-        left, which = ("imu", "clock.no_lag_imu") if agree else ("obd", "clock.no_lag_obd")
-        return _moved(drive, left, lambda t: t, lost).with_problems(
-            Problem.of(which, spans=text, **edges)
-        )
-    for table in ("obd", "imu"):
-        drive = _moved(drive, table, lambda t: t, lost)
-    return drive.with_problems(Problem.of("clock.no_lag", spans=text, **edges))
-
-
-def _speeds_agree(drive: Drive, when: tuple[tuple[float, float], ...]) -> bool | None:
-    """Say whether vehicle speed and speed over ground are one in some times; None if unknown."""
-    speed, ground = drive.get("vehicle_speed"), _gnss_speed(drive)
-    if speed is None or ground is None or not len(speed) or not len(ground):
-        return None
-    every = np.arange(drive.start, drive.end, 1.0)
-    inside = np.logical_or.reduce([(every > a) & (every < b) for a, b in when])
-    time = every[inside & (speed.age(every) < _OWN[1]) & (ground.age(every) < _OWN[1])]
-    if time.size < _SEEN * np.count_nonzero(inside):
-        return None
-    own, other = speed.at(time), ground.at(time)
-    least, part = _SPEEDS_APART
-    near = np.abs(own - other) < least + part * np.abs(other)
-    return bool(np.ptp(other) > _SPEEDS_RANGE and np.mean(near) > _SPEEDS_AGREE)
-
-
 def _line(time: Floats, lag: Floats, scatter: float) -> tuple[float, float, Floats]:
     """Robust line: slope, its standard deviation, and its values (k,)."""
     t = time - time.mean()
-    i, j = np.triu_indices(t.size, 1)
-    slope = float(np.median((lag[j] - lag[i]) / (t[j] - t[i])))
+    slope = median_slope(t, lag)
     middle = float(np.median(lag - slope * t))
     weight = np.ones(t.size)
     for _ in range(20):
@@ -328,22 +248,6 @@ def _line(time: Floats, lag: Floats, scatter: float) -> tuple[float, float, Floa
         middle = float(np.sum((lag - slope * t) * weight) / total)
     std = scatter * float(np.sqrt(_OVERLAP / max(np.sum(weight * t**2), 1e-9)))
     return slope, std, middle + slope * t
-
-
-def _median_of_three(y: Floats) -> Floats:
-    if y.size < 3:
-        return y
-    padded = np.concatenate((y[:1], y, y[-1:]))
-    return np.asarray(np.median([padded[:-2], padded[1:-1], padded[2:]], axis=0))
-
-
-def _lone(lag: Floats) -> Bools:
-    """Mark pieces far from both neighbours, which agree: a false peak."""
-    lone = np.zeros(lag.size, dtype=bool)
-    before, here, after = lag[:-2], lag[1:-1], lag[2:]
-    off = np.minimum(np.abs(here - before), np.abs(here - after))
-    lone[1:-1] = (off > 2.0 * _STEP) & (np.abs(before - after) < _STEP)
-    return lone
 
 
 def _alike(a: _Path, b: _Path) -> bool:

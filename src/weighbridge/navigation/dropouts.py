@@ -1,11 +1,10 @@
-"""Inertial samples that cannot be: zeros in place of a reading, spikes, an axis at its limit."""
+"""Inertial samples that cannot be: zeros in place of a reading, spikes."""
 
 from __future__ import annotations
 
 from typing import Final
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
 
 from weighbridge.constants import GRAVITY
 from weighbridge.navigation.axes import Axes
@@ -27,31 +26,14 @@ _ZEROS: Final = 0.002
 _MORE: Final = 4.0
 """if there are so many times more of them than of the values beside them [-]."""
 
-_REPEATS: Final = 0.3
-"""With a larger part of repeated samples in motion the sensor is slower than its table [-]."""
 
-_AT_LIMIT: Final = (5e-4, 0.3)
-"""Part of the samples at an axis's highest or lowest value at which it is a limit [-]: with more
-than the larger part it is the axis of gravity, whose limit does not matter."""
-
-_CLIPPED: Final = 0.1
-"""A larger part of samples at the limit leaves no mean [-],"""
-
-_WINDOW: Final = 1.0
-"""over so long [s]."""
-
-_RARE: Final = 0.03
-"""Spikes are no larger part of the samples [-]."""
-
-
-def false_rows(accel: Axes, gyro: Axes, moving: Bools, period: float) -> Bools:
+def false_rows(accel: Axes, gyro: Axes, moving: Bools) -> Bools:
     """Mark samples that say nothing of the motion.
 
     Parameters
     ----------
     accel, gyro : specific force [m/s^2] and rate [rad/s]
     moving : (n,) the vehicle moves
-    period : of the samples [s]
 
     Returns
     -------
@@ -69,50 +51,7 @@ def false_rows(accel: Axes, gyro: Axes, moving: Bools, period: float) -> Bools:
     for kind, block in enumerate((accel, gyro)):
         for x in block.columns:
             false |= _spikes(x, _LEAST_SPIKE[kind]) | _zeros(x, moving)
-    # What has no reading must not pass for the lowest one.
-    good = ~false
-    if good.any():
-        for x in (*accel.columns, *gyro.columns):
-            false[good] |= _clipped(x if good.all() else x[good], round(_WINDOW / period))
     return np.asarray(false)
-
-
-def rare_spikes(x: Floats, kind: str) -> Bools:
-    """Mark single samples of one axis that leap away and return at once, where they are few.
-
-    Parameters
-    ----------
-    x : (n,) force [m/s^2] or rate [rad/s]
-    kind : ``accel`` or ``gyro``
-
-    Returns
-    -------
-    (n,) all False where they are more than `_RARE`: that is noise
-    """
-    found = _spikes(x, _LEAST_SPIKE[kind == "gyro"])
-    few = np.count_nonzero(found) <= _RARE * x.size
-    return found if few else np.zeros(x.size, dtype=bool)
-
-
-def repeated_rows(accel: Axes, gyro: Axes, moving: Bools) -> Bools:
-    """Mark samples in motion that a slower sensor only repeats; none where few are alike.
-
-    Parameters
-    ----------
-    accel, gyro
-    moving : (n,) the vehicle moves
-
-    Returns
-    -------
-    (n,)
-    """
-    same = moving.copy()
-    same[:1] = False
-    for x in (*accel.columns, *gyro.columns):
-        same[1:] &= x[1:] == x[:-1]
-    if np.count_nonzero(same) < _REPEATS * np.count_nonzero(moving):
-        same[:] = False
-    return same
 
 
 def _spikes(x: Floats, least: float) -> Bools:
@@ -149,18 +88,3 @@ def _zeros(x: Floats, moving: Bools) -> Bools:
         return np.zeros(x.size, dtype=bool)
     near = int(np.count_nonzero((x >= low) & (x <= high) & moving)) - here
     return zero if here > _MORE * max(near, 1) / 10.0 else np.zeros(x.size, dtype=bool)
-
-
-def _clipped(x: Floats, width: int) -> Bools:
-    width = max(width, 3)
-    lost = np.zeros(x.size, dtype=bool)
-    for limit in (float(x.max()), float(x.min())):
-        at = x == limit
-        count = int(np.count_nonzero(at))
-        if not _AT_LIMIT[0] * x.size < count < _AT_LIMIT[1] * x.size or count <= _CLIPPED * width:
-            continue
-        inner = 0.98 * limit if abs(limit) > 0.0 else 0.0
-        near = int(np.count_nonzero((x > min(inner, limit)) & (x < max(inner, limit))))
-        if count > _MORE * near:
-            lost |= uniform_filter1d(at.astype(np.float64), width) > _CLIPPED
-    return lost

@@ -18,9 +18,8 @@ from weighbridge.balance.circumference import on_its_tyres
 from weighbridge.balance.delay import (
     clock_shift,
     estimate_torque_delay,
-    far_shift,
 )
-from weighbridge.balance.gear_fit import ENOUGH, foreign_part, ratio_apart, share_on_gears
+from weighbridge.balance.gear_fit import ENOUGH, ratio_apart, share_on_gears
 from weighbridge.balance.gear_scale import scale_contradiction
 from weighbridge.balance.hybrid import motor_helps
 from weighbridge.balance.shaking import shaken
@@ -30,7 +29,7 @@ from weighbridge.errors import ConfigError, DriveError, WeighbridgeError
 from weighbridge.estimators import ESTIMATORS, MassTrack, Status, joint
 from weighbridge.estimators.gate import GATE
 from weighbridge.estimators.joint.bend import bent
-from weighbridge.estimators.joint.changing import in_place_of_loads, largest
+from weighbridge.estimators.joint.changing import largest
 from weighbridge.estimators.joint.contradicted import contradicted
 from weighbridge.estimators.joint.foreign import of_another
 from weighbridge.estimators.joint.slow_errors import motion_variance, with_variance
@@ -309,7 +308,6 @@ def weigh_balance(
     elif not estimator.speed_alone and (
         why := motor_helps(drive, balance, vehicle)
         or scale_contradiction(balance, vehicle)
-        or foreign_part(balance, vehicle)
         or shaken(drive, balance.motion)
         or _smoothed(drive, vehicle, result)
     ):
@@ -328,18 +326,15 @@ def weigh_balance(
             status, reason = Status.INCONSISTENT, why
         else:
             possible = result.possible_change
-            given = joined.filter_input
-            no_load = in_place_of_loads(given) if given is not None else None
-            of_scale = [one for one in (change, no_load) if one is not None and one.doubt]
             result = result.doubted(
                 math.hypot(
-                    *(one.doubt_std for one in of_scale),
+                    change.doubt_std if change is not None else 0.0,
                     ALTERED_STD if any(p.id in ALTERED for p in problems) else 0.0,
                     UNBACKED_STD if unbacked(vehicle) else 0.0,
                 )
             )
-            doubts = [one.doubt for one in of_scale]
-            if doubts and result.std > GATE.widest * result.mass:
+            doubts = [change.doubt if change is not None else None]
+            if doubts[0] is not None and result.std > GATE.widest * result.mass:
                 status, reason = Status.INCONSISTENT, doubts.pop(0)
             doubts += [doubt, possible.note if possible is not None else None]
             problems += tuple(d for d in doubts if d is not None)
@@ -484,8 +479,6 @@ def torque_balance(drive: Drive, vehicle: Vehicle) -> tuple[ForceBalance, tuple[
     if begun is None or begun.delay != delay:
         begun = force_balance(drive, vehicle, motion, delay=delay)
     balance = replace(begun, navigation=navigation)
-    if behind := far_shift(balance, vehicle):
-        raise refused("torque.clock_alone", drive=drive.name, later=_later(-behind), by=-behind)
     return balance, notes + other_equipment(vehicle, motion) + balance.notes
 
 

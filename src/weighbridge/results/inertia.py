@@ -13,6 +13,7 @@ import numpy as np
 from weighbridge.estimators.track import Status
 from weighbridge.inertia.filter import InertiaTrack, Method, inverse_interval
 from weighbridge.inertia.suspension import SuspensionCheck
+from weighbridge.messages import Explained
 from weighbridge.results.writing import check_level, number, write_track
 from weighbridge.signals import Drive, Floats, Problem
 from weighbridge.signals.shown import in_html, plural
@@ -51,7 +52,7 @@ class LoadSegment:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class InertiaResult:
+class InertiaResult(Explained):
     """Sprung mass and inertias at the end of a drive, their uncertainty and the reason.
 
     Attributes
@@ -87,21 +88,6 @@ class InertiaResult:
             low, high = self.mass_interval()
             found = f"{self.mass:.0f} kg, {low:.0f} to {high:.0f} kg with 95 % probability"
         return in_html((head, found, plural(len(self.warnings), "warning")))
-
-    @property
-    def reason(self) -> str:
-        """Why there is no mass, one sentence; empty where there is."""
-        return "" if self.refusal is None else self.refusal.text
-
-    @property
-    def reason_id(self) -> str | None:
-        """Id of that sentence; None where there is a mass."""
-        return None if self.refusal is None else self.refusal.id
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """Texts of the `problems`."""
-        return tuple(p.text for p in self.problems)
 
     @property
     def ride(self) -> Ride:

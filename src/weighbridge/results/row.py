@@ -8,13 +8,13 @@ from dataclasses import dataclass
 from typing import Any
 
 from weighbridge.estimators import Segment, Status
-from weighbridge.messages import Problem
+from weighbridge.messages import Explained, Problem
 from weighbridge.results.writing import number
 from weighbridge.visible import visible_json
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class WeighingRow:
+class WeighingRow(Explained):
     """What `MassResult` says in numbers and words; a few hundred bytes where that holds arrays.
 
     Attributes
@@ -48,21 +48,6 @@ class WeighingRow:
     segments: tuple[Segment, ...] = ()
     problems: tuple[Problem, ...] = ()
     load_changed: bool = False
-
-    @property
-    def reason(self) -> str:
-        """Why there is no mass, one sentence; empty where there is."""
-        return "" if self.refusal is None else self.refusal.text
-
-    @property
-    def reason_id(self) -> str | None:
-        """Id of that sentence; None where there is a mass."""
-        return None if self.refusal is None else self.refusal.id
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """Texts of the `problems`."""
-        return tuple(p.text for p in self.problems)
 
     def to_dict(self) -> dict[str, Any]:
         """Return what ``weigh --json`` prints: numbers, None where there is no mass."""

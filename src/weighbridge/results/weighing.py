@@ -12,6 +12,7 @@ from scipy.special import stdtrit
 
 from weighbridge.balance import REASON_TEXT, Reason
 from weighbridge.estimators import ESTIMATORS, Estimator, MassTrack, Segment, Status
+from weighbridge.messages import Explained
 from weighbridge.results.row import WeighingRow
 from weighbridge.results.writing import check_level, write_track
 from weighbridge.signals import Drive, Problem
@@ -42,7 +43,7 @@ TRACK_COLUMNS: Final = (
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
-class MassResult:
+class MassResult(Explained):
     """The mass of one drive, how sure it is, and why.
 
     Attributes
@@ -82,21 +83,6 @@ class MassResult:
         used = f"{self.used_time:.0f} of {self.drive.duration:.0f} s used"
         doubts = plural(len(self.warnings), "warning")
         return head, mass, f"{used}; {doubts}{': ' + self.warnings[0] if self.warnings else ''}"
-
-    @property
-    def reason(self) -> str:
-        """Why there is no mass, one sentence; empty where there is."""
-        return "" if self.refusal is None else self.refusal.text
-
-    @property
-    def reason_id(self) -> str | None:
-        """Id of that sentence; None where there is a mass."""
-        return None if self.refusal is None else self.refusal.id
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """Texts of the `problems`."""
-        return tuple(p.text for p in self.problems)
 
     @property
     def estimator(self) -> Estimator:

@@ -11,11 +11,8 @@ from weighbridge.signals.catalogue import QUANTITIES
 from weighbridge.signals.drive import Drive
 from weighbridge.signals.signal import Bools, Floats, Signal
 
-FIXES: Final = "gnss"
-"""Table of one device: a row is new where any of its values is."""
-
-ELSEWHERE: Final = "imu"
-"""Table whose repeats `weighbridge.navigation.aiding.read_imu` leaves out, live as well."""
+DEVICES: Final = ("gnss", "imu")
+"""Tables of one device: a row is new where any of its values is."""
 
 _FEWEST: Final = 30
 """Fewer changes show no period [-]."""
@@ -78,13 +75,13 @@ def without_repeats(drive: Drive) -> Drive:
 
     Signals that a person vouches for (``drive.info.trusted``) stay as they are.
     """
-    together: dict[tuple[bytes, int], list[Signal]] = {}
+    together: dict[tuple[str, bytes, int], list[Signal]] = {}
     for name, signal in drive.signals.items():
-        table = QUANTITIES[name].table
-        if len(signal) < 2 or table == ELSEWHERE or name in drive.info.trusted:
+        if len(signal) < 2 or name in drive.info.trusted:
             continue
-        shared = signal.time[[0, -1]].tobytes() if table == FIXES else name.encode()
-        together.setdefault((shared, len(signal)), []).append(signal)
+        table = QUANTITIES[name].table
+        span = signal.time[[0, -1]].tobytes() if table in DEVICES else b""
+        together.setdefault((table if span else name, span, len(signal)), []).append(signal)
     kept: list[Signal] = []
     problems: list[Problem] = []
     for signals in together.values():

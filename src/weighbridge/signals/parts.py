@@ -15,6 +15,7 @@ from weighbridge.messages import Problem
 from weighbridge.signals.drive import Drive
 from weighbridge.signals.instants import span
 from weighbridge.signals.signal import Floats, Signal
+from weighbridge.signals.timeline import STANDS_FOR
 
 PAUSE: Final = 300.0
 """Where nothing is recorded for so long a drive ends, unless the vehicle moves on after it [s]."""
@@ -31,7 +32,6 @@ DRIVEN: Final = 30.0
 _STILL: Final = 0.5  # slower, the vehicle stands [m/s]
 _MOVING: Final = 3.0  # faster, it moves [m/s]
 _AS_BEFORE: Final = 3.0  # speeds to both sides of a clock that was set [m/s]
-_STANDS_FOR: Final = 2.0  # a sample means so long at most [s]
 
 # A splice: samples so near in time that differ as no vehicle's do, and so do those around them.
 _NEAR: Final = 5.0  # [s]
@@ -369,7 +369,7 @@ def _driven(drive: Drive) -> bool:
     speed = drive.speed
     if speed is None or len(speed) < 2:
         return False
-    step = np.minimum(np.diff(speed.time), _STANDS_FOR)
+    step = np.minimum(np.diff(speed.time), STANDS_FOR)
     return bool(np.sum(step[np.abs(speed.values[1:]) > _MOVING]) >= DRIVEN)
 
 
@@ -398,5 +398,5 @@ def find_restarts(time: Floats) -> list[slice]:
     back = back[known[back + 1] < np.array(usual[:-1])]
     edges = [0, *places[back + 1].tolist(), time.size]
     rows = [slice(a, b) for a, b in pairwise(edges)]
-    long = [r for r in rows if np.nansum(np.clip(np.diff(time[r]), 0.0, _STANDS_FOR)) >= DRIVEN]
+    long = [r for r in rows if np.nansum(np.clip(np.diff(time[r]), 0.0, STANDS_FOR)) >= DRIVEN]
     return long if len(long) > 1 and len(long) >= 0.5 * len(rows) else []

@@ -119,6 +119,18 @@ def robust_fits(columns: Floats, y: Floats) -> tuple[Floats, Floats]:
     return found / size, weight
 
 
+def median_of_three(values: Floats) -> Floats:
+    """Return the median of each value (n,) and its neighbours; the ends stand twice."""
+    padded = np.concatenate((values[:1], values, values[-1:]))
+    return np.asarray(np.median([padded[:-2], padded[1:-1], padded[2:]], axis=0))
+
+
+def median_slope(x: Floats, y: Floats) -> float:
+    """Return the median slope of all pairs of points (n,) (Theil 1950, Sen 1968)."""
+    i, j = np.triu_indices(x.size, 1)
+    return float(np.median((y[j] - y[i]) / (x[j] - x[i])))
+
+
 def resolution(values: Floats) -> float:
     """Return the step that values (n,) are quantised to, in their unit; 0 where none shows."""
     some = values[:: 1 + values.size // _TELLING]

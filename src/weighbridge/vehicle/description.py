@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 
 from weighbridge.constants import (
+    CRUISE,
     GAS_CONSTANT_DRY_AIR,
     GRAVITY,
     STANDARD_PRESSURE,
@@ -31,8 +32,6 @@ _MOTIONS: Final = {
     "speed": "speed alone, no grade",
 }
 
-_CRUISE: Final = 100.0 / 3.6
-"""Speed at which gears and road load are given [m/s]."""
 
 _FEWEST_RELIABLE: Final = 2
 """Calibration drives from which a file is reported as good as in the table of docs/accuracy.md."""
@@ -112,11 +111,11 @@ def _gears(vehicle: Vehicle) -> str:
     if source_of(vehicle).gearing is not None:
         return "not needed: what is read does not depend on them"
     if line.gearing_range is not None:
-        low, high = (scalar_from_si(g * _CRUISE, "rpm") for g in line.gearing_range)
+        low, high = (scalar_from_si(g * CRUISE, "rpm") for g in line.gearing_range)
         return f"stepless, {low:.0f} to {high:.0f} rpm at 100 km/h; measured at each instant"
     if not line.gearings:
         return "not known; a calibration finds them from engine and vehicle speed"
-    last = line.gearings[-1] * _CRUISE
+    last = line.gearings[-1] * CRUISE
     speed = f"{scalar_from_si(last, 'rpm'):.0f} rpm at 100 km/h"
     if line.single_speed:
         return f"one gear, {speed}"
@@ -159,11 +158,11 @@ def _with_std(known: Value, digits: int) -> str:
 def _road(vehicle: Vehicle) -> str:
     drag_area, rolling = vehicle.road.drag_area, vehicle.road.rolling_coefficient
     density = STANDARD_PRESSURE / (GAS_CONSTANT_DRY_AIR * STANDARD_TEMPERATURE)
-    drag = 0.5 * density * drag_area.value * _CRUISE**2
+    drag = 0.5 * density * drag_area.value * CRUISE**2
     text = f"C_d A {_with_std(drag_area, 2)} m², C_r {_with_std(rolling, 4)}"
     if vehicle.tare is not None:
         force = drag + rolling.value * vehicle.tare * GRAVITY
-        text += f"; empty at 100 km/h on the flat {force * _CRUISE / 1000.0:.0f} kW"
+        text += f"; empty at 100 km/h on the flat {force * CRUISE / 1000.0:.0f} kW"
     return text
 
 

@@ -11,6 +11,7 @@ from weighbridge.signals.robust import huber, spread
 from weighbridge.vehicle.gear import (
     HIGHEST_GEARING,
     LOWEST_GEARING,
+    SLIPS,
     UNSLIPPED,
     effective_gearing,
     predict_gear,
@@ -35,8 +36,6 @@ ROBUST: Final = 1.5
 """Residual over its scatter beyond which a row counts less [-] (Huber). With 1.345 the RMS by
 an accelerometer alone rises by 3 % of itself."""
 
-SLOWEST: Final = 3.0
-"""Below clutches slip [m/s]."""
 
 STEADY: Final = 0.02
 """Change of the ratio from one sample to the next that is still one gear [-]."""
@@ -149,7 +148,7 @@ def _in_gear(
     speed = np.interp(time, instants, speeds)
     ratio = effective_gearing(engine_speed, speed)
     gear, _ = predict_gear(engine_speed, speed, gearings)
-    held = steady(time, ratio, np.full(time.size, STEADY)) & (gear > 0) & (speed > SLOWEST)
+    held = steady(time, ratio, np.full(time.size, STEADY)) & (gear > 0) & (speed > SLIPS)
     held &= _often(gear, held)
     if np.count_nonzero(held) < FEWEST:
         return None

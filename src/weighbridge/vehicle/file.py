@@ -130,6 +130,8 @@ def _witnesses(root: Section) -> tuple[SecondSignalRelation, ...]:
         values = {
             key.field: value for key in WITNESS_KEYS if (value := _value(section, key)) is not None
         }
+        for old in ("blur_s", "unexplained"):
+            section.number(old)
         section.done()
         values["signal"] = signal
         _refuse_gaps(section, SecondSignalRelation, WITNESS_KEYS, values)

@@ -65,9 +65,7 @@ WITNESS_KEYS: Final = (
     Key("scale_std", "scale_std", "by how much its scale differs between drives"),
     Key("value_range", "value_range", "w it has seen, in SI", "numbers", pair=True),
     Key("speed_range", "speed_range", "N it has seen", "numbers", "rpm", pair=True),
-    Key("blur", "blur", "by how much the reading is smoother than w", suffix="s"),
     Key("lag", "lag", "by how much it is later than w", suffix="s"),
-    Key("unexplained", "unexplained", "part of its variance that w leaves"),
     Key("pressure", "pressure", "of the air on the drives", suffix="kpa"),
     Key("temperature", "temperature", "of the air on the drives", suffix="degc"),
 )

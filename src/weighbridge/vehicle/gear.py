@@ -37,6 +37,9 @@ least in 33 calibrations of simulated vehicles with gears, 0.51 with an engine s
 FEWEST_SECONDS: Final = 100
 """On the move that show it."""
 
+SLIPS: Final = 3.0
+"""Slower, clutch and converter slip [m/s]."""
+
 UNSLIPPED: Final = 6.0
 """Speed from which clutch and converter in front of a stepless gearbox are locked [m/s]: they lock
 by 20 km/h."""

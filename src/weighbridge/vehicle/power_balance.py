@@ -15,6 +15,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from weighbridge.constants import INDEPENDENT
 from weighbridge.messages import Problem
 from weighbridge.signals import Bools, Drive, Floats, Signal
 from weighbridge.signals.robust import robust_fit
@@ -53,8 +54,6 @@ WINDOW: Final = 1.0
 LATEST: Final = 1.0
 """Battery power may be later or earlier than torque by this much [s]."""
 
-BLOCK: Final = 60.0
-"""Residuals this far apart are independent [s]."""
 
 CONTRADICTION: Final = 2.0
 """Battery and data sheet contradict each other beyond so many standard deviations [-]."""
@@ -157,7 +156,9 @@ def find_power_balance(drive: Drive, vehicle: Vehicle) -> PowerBalance | None:
     battery, power, loss = (_without_slow(time, x) for x in (electric, shaft, np.abs(shaft)))
     sign = math.copysign(1.0, float(power[moving] @ battery[moving]))
     design = np.column_stack([power, loss, np.ones_like(power)])[moving]
-    (slope, lost, _), noise = _robust_fit(design, sign * battery[moving], time[moving] // BLOCK)
+    (slope, lost, _), noise = _robust_fit(
+        design, sign * battery[moving], time[moving] // INDEPENDENT
+    )
     if not slope > abs(lost):
         return None
     scale = float(1.0 / slope)

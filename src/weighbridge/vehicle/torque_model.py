@@ -221,9 +221,8 @@ class SecondSignalRelation:
     scale_std : by how much the scale of reading over second signal differs between drives [-]
     value_range : values of the second signal that the relation has seen, in its own SI unit
     speed_range : engine speeds that it has seen [rad/s]
-    blur, lag : time constant by which the reading is smoother than the second signal, and by how
-        much it is later [s]; None where the drives were sampled too slowly
-    unexplained : part of the variance of single readings that is left then [-]
+    lag : by how much the reading is later than the second signal [s]; None where the drives were
+        sampled too slowly
     pressure, temperature : of the ambient air [Pa], [K]; None where it was not known
     """
 
@@ -234,9 +233,7 @@ class SecondSignalRelation:
     scale_std: float
     value_range: tuple[float, float]
     speed_range: tuple[float, float]
-    blur: float | None = None
     lag: float | None = None
-    unexplained: float | None = None
     pressure: float | None = None
     temperature: float | None = None
 
@@ -254,10 +251,7 @@ class SecondSignalRelation:
         for name in ("scatter", "span", "scale_std"):
             positive(name, getattr(self, name))
             within(name, getattr(self, name), 1e-15, 1e9)
-        not_negative("blur", self.blur)
-        within("blur", self.blur, 0.0, 60.0, "s")
         within("lag", self.lag, -60.0, 60.0, "s")
-        within("unexplained", self.unexplained, 0.0, 1.0)
         within("pressure", self.pressure, 1e4, 2e5, "Pa")
         within("temperature", self.temperature, 150.0, 400.0, "K")
 

@@ -21,7 +21,6 @@ from weighbridge.estimators.joint.confounded import inertia_relative_std
 from weighbridge.estimators.joint.load_stops import (
     change_odds,
     stood_before,
-    too_hasty,
     unseen_std,
 )
 from weighbridge.estimators.joint.possible import averaged
@@ -273,16 +272,11 @@ def _solve(asked: _Asked) -> _Solved:
     problem = asked.problem
     fast, slow = problem.likeliest()
     start, noise, params = problem.kernel_input(fast, slow)
-    while True:
-        _, running, running_var, begins = problem.changes(fast, slow)
-        added = np.where(begins[:, None], problem.jump_var, 0.0)
-        x, var, taken, weight = disturbance.smooth(
-            start, problem.time, problem.rows, problem.y, noise, added, params
-        )
-        hasty = too_hasty(begins, asked.stood, x[:, 0])
-        if not hasty.any():
-            break
-        problem = replace(problem, odds=np.where(hasty, np.nan, problem.odds))
+    _, running, running_var, begins = problem.changes(fast, slow)
+    added = np.where(begins[:, None], problem.jump_var, 0.0)
+    x, var, taken, weight = disturbance.smooth(
+        start, problem.time, problem.rows, problem.y, noise, added, params
+    )
     return _Solved(
         fast=fast,
         slow=slow,

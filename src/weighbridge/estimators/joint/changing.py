@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -49,18 +48,11 @@ LAUNCH: Final = 1e6
 SCALE_STD: Final = 0.3
 """Standard deviation of a change of scale before the drive has shown [-]."""
 
-AS_WELL: Final = 0.0
-"""Gain of likelihood of a change of scale over the changes of load found, from which it may be the
-one as well as the other [-]."""
-
 ALIKE_BY_SPEED: Final[dict[MotionSource, str]] = {
     "speed_grade": "load.change_by_heights",
     "speed": "load.change_by_speed",
 }
 """What looks alike where speed alone shows a change of the torque's scale, by what is beside it."""
-
-QUICK: Final = 60.0
-"""Where every stop with a change of load was longer, somebody loaded [s]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,54 +110,6 @@ class ScaleChange:
         return Problem.of(id, start=self.start, end=self.end, change=100.0 * self.change, when=when)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class NoLoad:
-    """A change of the torque's scale in place of all the changes of load that were found.
-
-    Attributes
-    ----------
-    start, end : of the scale that is another; of a ramp, from 0 to all of it [s]
-    ramp : it changes evenly
-    change, std : of the scale, relative to before, and its standard deviation [-]
-    gain : logarithm of the likelihood over that of the changes of load [-]
-    stood : of the shortest stop with a change of load [s]
-    """
-
-    start: float
-    end: float
-    ramp: bool
-    change: float
-    std: float
-    gain: float
-    stood: float
-
-    @property
-    def doubt(self) -> Problem | None:
-        """What may be wrong; None where it was loading."""
-        if self.gain < AS_WELL or self.stood > QUICK:
-            return None
-        if abs(self.change) <= max(LEAST, SIGNIFICANT * self.std):
-            return None
-        size = phrase("less" if self.change < 0.0 else "more", share=100.0 * abs(self.change))
-        how = phrase("goes_evenly") if self.ramp else "is"
-        return Problem.of(
-            "load.scale_or_load",
-            start=self.start,
-            end=self.end,
-            span=span(round(self.start), round(self.end)),
-            how=how,
-            size=size,
-            stood=self.stood,
-        )
-
-    @property
-    def doubt_std(self) -> float:
-        """What the doubt leaves open of the mass, relative [-]: either may be so; 0 without one."""
-        if self.doubt is None:
-            return 0.0
-        return abs(self.change) / math.sqrt(1.0 + math.exp(-self.gain))
-
-
 def largest(given: FilterInput) -> ScaleChange | None:
     """Find the change of scale, a step or a ramp, that explains a drive best.
 
@@ -213,51 +157,6 @@ def largest(given: FilterInput) -> ScaleChange | None:
     if best is None or not best.sure:
         return best
     return replace(best, gain=best.gain + same - _with_stops(given, same), over_one=best.gain)
-
-
-def in_place_of_loads(given: FilterInput) -> NoLoad | None:
-    """Find the change of scale that explains a drive best without any change of load.
-
-    A load is felt by all that goes with the mass, and the scale of the torque by air drag and
-    friction of the engine as well. A reading that is wrong between two stops needs one number where
-    two loads need two, and they have to be alike.
-
-    Parameters
-    ----------
-    given : of the joint estimator
-
-    Returns
-    -------
-    NoLoad
-        None where no load was found to change.
-    """
-    changed = np.flatnonzero(given.added.any(axis=1))
-    if not changed.size:
-        return None
-    given = _without_launches(given)
-    time = given.time
-    edges = [*changed, time.size]
-    parts = [(a, b) for i, a in enumerate(edges) for b in edges[i + 1 :]]
-    here = np.arange(time.size)
-    shapes = [(a, b, ((here >= a) & (here < b)).astype(np.float64)) for a, b in parts]
-    shapes.append((0, time.size, (time - time[0]) / (time[-1] - time[0])))
-    none = np.zeros_like(given.added)
-    same, *_ = _run(given, np.zeros_like(time), given.added)
-    found = []
-    for first, last, shape in shapes:
-        likelihood, change, std = _run(given, shape, none)
-        found.append(
-            NoLoad(
-                start=float(time[first]),
-                end=float(time[last - 1]),
-                ramp=bool(first == 0),
-                change=change,
-                std=std,
-                gain=likelihood - same,
-                stood=float(np.min(given.stood[changed])),
-            )
-        )
-    return max(found, key=lambda one: one.gain)
 
 
 def _without_launches(given: FilterInput) -> FilterInput:

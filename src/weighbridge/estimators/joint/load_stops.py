@@ -8,7 +8,7 @@ import numpy as np
 
 from weighbridge.balance.table import ForceTable
 from weighbridge.estimators.judging import STOP
-from weighbridge.signals import Bools, Floats
+from weighbridge.signals import Floats
 
 CHANGE_ODDS: Final = -3.0
 """Logarithm of the odds that the load changes at a stop of `STOP`: one stop in twenty, for
@@ -32,10 +32,6 @@ OPENED: Final = 3.0
 LOADED: Final = 0.01
 """Part of the mass that a second beyond `OPENED` loads or unloads [1/s]: a passenger in 1.6 s
 through each of three doors of a bus of 13 t."""
-
-HASTIEST: Final = 2.5
-"""Multiple of that beyond which nothing is loaded in a stop shorter than `STOP` [-]: 45 kg/s of a
-car."""
 
 MOST_LOADED: Final = 0.3
 """Part of the mass that a whole stop loads or unloads [-]."""
@@ -99,25 +95,11 @@ def unseen_std(stood: Floats, boarding_std: float) -> float:
     return boarding_std * float(np.sqrt(stops / 3.0))
 
 
-def loadable(stood: Floats, haste: float = 1.0) -> Floats:
+def loadable(stood: Floats) -> Floats:
     """Part of the mass that a stop loads or unloads (m,) [-].
 
     Parameters
     ----------
     stood : (m,) how long the vehicle stood [s]
-    haste : multiple of `LOADED` [-]
     """
-    return np.minimum(haste * LOADED * np.maximum(stood - OPENED, 0.0), MOST_LOADED)
-
-
-def too_hasty(begins: Bools, stood: Floats, mass: Floats) -> Bools:
-    """Mark changes of load that are too large for the time the vehicle stood (m,).
-
-    Parameters
-    ----------
-    begins : (m,) windows before which the load changed
-    stood : (m,) how long the vehicle stood before each [s]
-    mass : (m,) of the windows [kg]
-    """
-    change = np.abs(np.diff(mass, prepend=mass[:1])) / np.abs(mass)
-    return np.asarray(begins & (stood < STOP) & (change > loadable(stood, HASTIEST)))
+    return np.minimum(LOADED * np.maximum(stood - OPENED, 0.0), MOST_LOADED)

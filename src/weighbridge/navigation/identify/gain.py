@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
-from weighbridge.constants import GRAVITY, SAMPLES_AT_ONCE
+from weighbridge.constants import GRAVITY, INDEPENDENT, SAMPLES_AT_ONCE
 from weighbridge.navigation.axes import Axes
 from weighbridge.navigation.identify.steps import fitted
 from weighbridge.navigation.motion import Motion
@@ -30,8 +30,6 @@ _LEVEL: Final = 30.0
 _SLOW: Final = 1.0
 """Slower, wheels do not show their speed [m/s]."""
 
-_BLOCK: Final = 60.0
-"""Blocks show how the scale scatters and changes [s]."""
 
 _FEWEST: Final = 5
 """Fewer blocks show no scale."""
@@ -79,13 +77,6 @@ _LONG: Final = 12.0
 _SMOOTHED: Final = 1.7
 """A scale is off by as much over `_SHORT` as over `_LONG` [s], 0.9 to 1.3 times in four vehicles; a
 speed that is smoothed over 0.7 to 3 s by 2.0 to 3.4 times."""
-
-_ALIKE: Final = 2.0
-"""Mean squared errors before and after a change of the scale differ by less [-]: by up to 1.5 in
-simulated drives with such a change, by 2.6 where an axis of the gyro was reversed."""
-
-_SMALL: Final = 0.07
-"""Errors of so much are small, whatever their ratio [m/s]."""
 
 _CHANGE_SURE: Final = 25.0
 """Squared error that a change of the scale must explain, over its variance [-]."""
@@ -146,7 +137,7 @@ def _starts(time: Floats) -> NDArray[np.intp]:
     """First sample of each block of a minute that has any; looks at a part after another."""
     found = [np.zeros(1, dtype=np.intp)]
     for first in range(0, time.size, SAMPLES_AT_ONCE):
-        block = np.floor((time[first : first + SAMPLES_AT_ONCE + 1] - time[0]) / _BLOCK)
+        block = np.floor((time[first : first + SAMPLES_AT_ONCE + 1] - time[0]) / INDEPENDENT)
         found.append(first + 1 + np.flatnonzero(np.diff(block)))
     return np.concatenate(found)
 
@@ -174,7 +165,7 @@ def find_gain(
     if pairs is None:
         return None
     time, force, shown = pairs
-    block = ((time - time[0]) / _BLOCK).astype(np.int64)
+    block = ((time - time[0]) / INDEPENDENT).astype(np.int64)
     square = np.bincount(block, force**2)
     common = np.bincount(block, force * shown)
     strong = square > 0.05 * float(np.max(square))
@@ -204,8 +195,6 @@ def find_gain(
     upheld = not again and _upheld(found, gravity)
     least = _LEFT if again else max(_LEAST, (_SURE_TWICE if upheld else _SURE) * std)
     if float(np.average(off, weights=weight)) < least + noise or float(np.max(off)) > _MOST:
-        return None
-    if curve[0] != curve[1] and _rougher(time, error, ends):
         return None
     if again or upheld:
         return found
@@ -241,17 +230,6 @@ def _smoothed(motion: Motion, speed: Signal) -> bool:
         _, force, shown = pairs
         off.append(abs(float(force @ force / (force @ shown)) - 1.0))
     return off[0] > _SMOOTHED * off[1]
-
-
-def _rougher(time: Floats, error: Floats, ends: Floats) -> bool:
-    """Say whether speed and force also fit worse after a change: then it is not the scale."""
-    middle = 0.5 * (ends[0] + ends[1])
-    # Blocks do not show the instant: next to it the fit may be wrong.
-    before, after = error[time < middle - _BLOCK], error[time > middle + _BLOCK]
-    if not before.size or not after.size:
-        return True
-    ratio = (float(np.mean(after)) + _SMALL**2) / (float(np.mean(before)) + _SMALL**2)
-    return not 1.0 / _ALIKE < ratio < _ALIKE
 
 
 def changes_of_speed(

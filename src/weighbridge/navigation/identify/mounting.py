@@ -11,7 +11,7 @@ import numpy as np
 
 from weighbridge.constants import GRAVITY
 from weighbridge.errors import DriveError
-from weighbridge.messages import Problem, phrase, refused
+from weighbridge.messages import Problem, refused
 from weighbridge.signals import Bools, Floats
 from weighbridge.signals.robust import huber
 
@@ -82,7 +82,6 @@ def coarse_mounting(
     if ok.sum() < 10:
         raise refused("imu.overlap", overlap=ok.sum() * period)
     gravity = np.median(accel[ok], axis=0)
-    _check_gravity(float(np.linalg.norm(np.mean(accel[ok], axis=0))))
     down = -gravity / np.linalg.norm(gravity)
     rest_gyro = np.median(gyro[resting & ok], axis=0) if (resting & ok).sum() >= 4 else None
     bias = rest_gyro if rest_gyro is not None else np.zeros(3)
@@ -91,7 +90,6 @@ def coarse_mounting(
     fit = _regressed(f, w, a, v, down, free_bias=rest_gyro is None)
     coef, std, weight = fit.coef, fit.std, fit.weight
     down = -coef[0] / np.linalg.norm(coef[0])
-    _check_gravity(float(np.linalg.norm(coef[0])))
 
     forward = coef[1] - down * (coef[1] @ down)
     right = coef[2] - down * (coef[2] @ down)
@@ -193,21 +191,11 @@ def _most_gain(force: Floats, rate: Floats, weight: Floats) -> float:
     return float(np.average(force**2, weights=weight)) / common if common > 0.0 else math.inf
 
 
-def _check_gravity(size: float) -> None:
-    """Refuse accelerometers that do not read gravity."""
-    if not 0.8 * GRAVITY < size < 1.2 * GRAVITY:
-        hint = phrase("looks_like_g") if 0.8 < size < 1.2 else ""
-        raise refused("imu.gravity_mean", size=size, hint=hint)
-
-
 def _check_axes(forward: Floats, right: Floats, down: Floats, std: Floats) -> None:
-    """Refuse axes that do not form a right-handed set and gyros in a wrong unit."""
+    """Refuse axes that do not form a right-handed set."""
     size = float(np.linalg.norm(right))
     if std[2] * 6.0 > max(size, 1e-9) or std[1] * 6.0 > float(np.linalg.norm(forward)):
         return
     along = float(np.cross(down, forward) @ right) / float(np.linalg.norm(forward))
     if along < -0.5 * size:
         raise refused("imu.axes_mirrored")
-    # Banked bends take much of the lateral force away, and a body that rolls adds to it.
-    if not 0.2 < size < 5.0:
-        raise refused("imu.gyro_scale", ratio=1.0 / size)
