@@ -522,6 +522,22 @@ def _misread_pairs() -> Iterator[Pair]:
                 )  # fmt: skip
 
 
+def _in_feet() -> Iterator[Pair]:
+    """Heights in feet of vehicles that are not misread otherwise, on hillier roads."""
+    change = partial(_times, factors={"altitude": 1.0 / FEET})
+    for of, name in (
+        ("foreign wagon", "drive-1"), ("foreign hatchback", "drive-1"),
+        ("foreign truck", "drive0"), ("second van", "motorway"), ("second semi", "ordinary"),
+        ("second semi", "motorway"),
+    ):  # fmt: skip
+        for equipment in ("full", "no IMU"):
+            yield Pair(
+                f"{of}/{name}/feet taken for metres/{equipment}", "fault: misread", of, equipment,
+                partial(_misread, drive=name, equipment=equipment, change=change),
+                sound=False, reference=f"{of}/{name}/{equipment}",
+            )  # fmt: skip
+
+
 def _other_sensors() -> Iterator[Pair]:
     """Calibrated with an inertial sensor and weighed without, and with one without a gyroscope."""
     for of in MADE:
@@ -541,7 +557,7 @@ def all_pairs() -> list[Pair]:
     """List all pairs, in an order that stays."""
     return [
         *_of_equipment(), *_cuts(), *_faults(), *_heights(), *_recordings(), *_strangers(),
-        *_misread_pairs(), *_other_sensors(),
+        *_misread_pairs(), *_in_feet(), *_other_sensors(),
     ]  # fmt: skip
 
 

@@ -28,6 +28,9 @@ STEPS = {"car": 1.0 / 255.0, "truck": 0.01, "electric": 0.5}
 MADE_BY = {"car": "car-calibration", "truck": "truck-calibration", "electric": "electric"}
 
 
+FOOT = 0.3048
+
+
 def as_sent(kind, change):
     """Return a change that the control unit itself makes: it sends its steps all the same."""
     return lambda t, x: np.round(change(t, x) / STEPS[kind]) * STEPS[kind]
@@ -739,3 +742,20 @@ def test_a_torque_that_is_held_now_and_then_is_left_out_there(fleet, kind):
     assert found.status is not Status.CONVERGED or abs(found.mass - fleet.mass(kind)) < (
         2.0 * found.std
     )
+
+
+@pytest.mark.parametrize(
+    ("kind", "factor"),
+    [("car", 1.0 / FOOT), ("truck", 1.0 / FOOT), ("electric", 1.0 / FOOT), ("car", FOOT)],
+)
+def test_heights_in_another_unit_are_named_by_what_hills_take(fleet, kind, factor):
+    inertial = [n for n in fleet.drive(kind).signals if n.startswith(("accel_", "gyro_"))]
+    drive = fleet.drive(kind).without(*inertial)
+    assert fleet.weigh(kind, drive).status == "converged"
+    wrong = with_signal(drive, "altitude", lambda t, x: factor * x)
+    found = fleet.weigh(kind, wrong)
+    assert found.reason_id == "altitude.scale"
+    # Noise of the heights is in the ratio too.
+    assert found.refusal.values["ratio"] == pytest.approx(factor, rel=0.25)
+    vouched = replace(wrong, info=replace(wrong.info, trusted=("altitude",)))
+    assert fleet.weigh(kind, vouched).reason_id != "altitude.scale"

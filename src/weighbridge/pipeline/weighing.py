@@ -21,6 +21,7 @@ from weighbridge.balance.delay import (
 )
 from weighbridge.balance.gear_fit import ENOUGH, ratio_apart, share_on_gears
 from weighbridge.balance.gear_scale import scale_contradiction
+from weighbridge.balance.height_scale import height_scale
 from weighbridge.balance.hybrid import motor_helps
 from weighbridge.balance.shaking import shaken
 from weighbridge.balance.speed_balance import speed_balance
@@ -309,6 +310,7 @@ def weigh_balance(
         why := motor_helps(drive, balance, vehicle)
         or scale_contradiction(balance, vehicle)
         or shaken(drive, balance.motion)
+        or _height_scale(drive, balance, vehicle)
         or _smoothed(drive, vehicle, result)
     ):
         status, reason = Status.INCONSISTENT, why
@@ -354,6 +356,13 @@ def weigh_balance(
         ),
         settings=settings,
     )
+
+
+def _height_scale(drive: Drive, balance: ForceBalance, vehicle: Vehicle) -> Problem | None:
+    """Say that heights are in another unit, unless a person vouches for them."""
+    if "altitude" in drive.info.trusted:
+        return None
+    return height_scale(balance, vehicle, drive.units.get("altitude"))
 
 
 def _smoothed(drive: Drive, vehicle: Vehicle, track: MassTrack) -> Problem | None:
