@@ -282,10 +282,10 @@ def _derived(drive: Drive) -> Drive:
     return drive.without(*IMU).with_signals(Signal("longitudinal_accel", s.time, rate))
 
 
-def _averaged(drive: Drive, *, span: float) -> Drive:
-    """Average the inertial sensor over a span [s]."""
+def _averaged(drive: Drive, *, span: float, names: tuple[str, ...] = IMU) -> Drive:
+    """Average signals, those of the inertial sensor or others, over a span [s]."""
     kept = []
-    for name in IMU:
+    for name in names:
         s = drive.signals[name]
         window = np.ones(max(1, round(span / s.period)))
         mean = np.convolve(s.values, window, "same") / np.convolve(np.ones(len(s)), window, "same")
@@ -504,6 +504,8 @@ def _misreadings(of: str) -> Iterator[tuple[str, tuple[str, ...], Callable[[Driv
     for span in (1.0, 3.0):
         seen = ("full", "no GNSS")
         yield f"inertial sensor averaged over {span:g} s", seen, partial(_averaged, span=span)
+    averaged = partial(_averaged, span=6.0, names=(torque,))
+    yield "torque averaged over 6 s", ("full", "no IMU"), averaged
     for scale in (0.96, 1.04):
         way = partial(_on_other_tyres, scale=scale, torque=torque)
         yield f"tyres of {scale:.0%} of the circumference", ("full", "no IMU"), way

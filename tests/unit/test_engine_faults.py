@@ -179,6 +179,15 @@ def test_a_torque_that_is_smoothed_gives_no_mass(fleet, kind):
         assert np.isnan(found.mass)
 
 
+@pytest.mark.parametrize("kind", ["car", "truck", "electric"])
+def test_a_smoothed_torque_is_found_without_an_inertial_sensor(fleet, kind):
+    inertial = [n for n in fleet.drive(kind).signals if n.startswith(("accel_", "gyro_"))]
+    drive = fleet.drive(kind).without(*inertial)
+    assert fleet.weigh_alone(kind, drive).status is Status.CONVERGED
+    smoothed = with_signal(drive, SOURCE[kind], without_quick_changes(6.0))
+    assert fleet.weigh_alone(kind, smoothed).reason_id == "torque.smoothed"
+
+
 def test_a_torque_through_a_filter_of_seconds_is_found(fleet):
     def filtered(t, x):
         share = 1.0 - np.exp(-float(np.median(np.diff(t))) / 1.6)
