@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -37,9 +37,9 @@ FEWEST_BLOCKS: Final = 5
 
 
 def height_scale(
-    balance: ForceBalance, vehicle: Vehicle, unit: str | None = None
+    balance: ForceBalance, vehicle: Vehicle, signal: str, unit: str | None = None
 ) -> Problem | None:
-    """Say that heights rise and fall by another factor than the road, None if not.
+    """Say that heights or grades are another factor of the road's, None if not.
 
     The force on the mass goes with acceleration and with grade alike. So the mass is the same by
     both, whatever the vehicle's scale of torque; heights in another unit make two of it.
@@ -48,7 +48,8 @@ def height_scale(
     ----------
     balance : with grade by heights, and acceleration by speed
     vehicle
-    unit : in which the drive's file states heights; None where it is not known
+    signal : altitude or grade, whichever shows the hills
+    unit : in which the drive's file states it; None where it is not known
 
     References
     ----------
@@ -86,8 +87,9 @@ def height_scale(
     if ratio <= 0.0 or not (steep or flat):
         return None
     feet, factor = unit == "ft", UNITS["ft"].factor
-    is_unit = steep != feet and abs(np.log(ratio / (factor if steep else 1.0 / factor))) < ALIKE
-    remedy = "altitude_out" if not is_unit else "altitude_feet" if steep else "altitude_metres"
-    return Problem.of(
-        "altitude.scale", ratio=1.0 / ratio, std=std / ratio**2, remedy=phrase(remedy)
-    )
+    like_feet = abs(np.log(ratio / (factor if steep else 1.0 / factor))) < ALIKE
+    remedy = "check_or_leave_out"
+    if signal == "altitude" and steep != feet and like_feet:
+        remedy = "altitude_feet" if steep else "altitude_metres"
+    found: dict[str, Any] = {"ratio": 1.0 / ratio, "std": std / ratio**2, "remedy": phrase(remedy)}
+    return Problem.of("altitude.scale", signal, **found)

@@ -359,10 +359,11 @@ def weigh_balance(
 
 
 def _height_scale(drive: Drive, balance: ForceBalance, vehicle: Vehicle) -> Problem | None:
-    """Say that heights are in another unit, unless a person vouches for them."""
-    if "altitude" in drive.info.trusted:
+    """Say that heights or grades are in another unit, unless a person vouches for them."""
+    signal = "grade" if drive.has("grade") else "altitude"
+    if signal in drive.info.trusted:
         return None
-    return height_scale(balance, vehicle, drive.units.get("altitude"))
+    return height_scale(balance, vehicle, signal, drive.units.get(signal))
 
 
 def _smoothed(drive: Drive, vehicle: Vehicle, track: MassTrack) -> Problem | None:
