@@ -68,6 +68,7 @@ def calls(short_drive, short_car, tmp_path_factory):
         "read_drives": (wb.read_drives, read),
         "read_frame": (wb.read_frame, {"frame": frame, "mapping": None, "name": "x"}),
         "to_frames": (wb.to_frames, {"drive": drive}),
+        "with_elevation": (wb.with_elevation, {"drive": drive, "raster": folder / "none.tif"}),
         "CalibrationSettings": (wb.CalibrationSettings, of(wb.CalibrationSettings())),
         "Signal": (wb.Signal, of(speed)),
         "Signal.at": (speed.at, {"time": time}),

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from weighbridge.arguments import check_path, check_type
 from weighbridge.errors import DriveError, MissingExtraError
 from weighbridge.messages import Problem
 from weighbridge.signals import Drive, Floats, Signal
@@ -50,11 +51,15 @@ def with_elevation(drive: Drive, raster: str | Path) -> Drive:
 
     Raises
     ------
+    ArgumentTypeError
+        One of both is of another type.
     DriveError
         The drive has no positions, or the raster cannot be read or holds none of them.
     MissingExtraError
         The package ``rasterio`` is not there.
     """
+    check_type("drive", drive, Drive, "a drive, as read_drive returns it")
+    check_path("raster", raster)
     latitude, longitude = drive.get("latitude"), drive.get("longitude")
     if latitude is None or longitude is None or not len(latitude):
         raise DriveError(f"{drive.name}: no positions, which heights of {raster} need")
