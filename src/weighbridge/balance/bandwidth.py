@@ -25,7 +25,7 @@ SMOOTHED: Final = 0.7
 """Force per acceleration over `FAST` against `SLOW` below which no mass is given [-]: 0.90 to 1.14
 in 14 undamaged drives of six vehicles of two simulators, 0.10 to 0.39 with the torque through a low
 pass of 3 s; over the shorter time 1.01 in four undamaged drives, 0.61 and 0.63 with 1 s. By speed
-alone, over the longer time, 0.70 to 1.24 in 21 undamaged drives of twelve vehicles, 0.24 to 0.49
+alone, over the longer time, 0.72 to 1.62 in 20 undamaged drives of twelve vehicles, 0.26 to 0.49
 with 3 s."""
 
 SURE: Final = 3.0
@@ -71,7 +71,7 @@ def smoothed_torque(
     balance, vehicle
     beside : (n,) force that is known to be accessories' [N]
     noise : variance of the mean specific force over a time [s] [m^2/s^4]; of a motion by speed
-        none counts, as it is a mean given all samples
+        that of its speed counts
 
     Returns
     -------
@@ -89,7 +89,9 @@ def smoothed_torque(
         return None
 
     def variance(span: float) -> float:
-        return noise(span) if source == "inertial" else 0.0
+        # Speeds at both ends make the mean acceleration.
+        by_speed = 2.0 * (balance.motion.speed_std / span) ** 2
+        return noise(span) if source == "inertial" else by_speed
 
     force = force_on_mass(table, vehicle) - beside
     use = table.usable & np.isfinite(force) & np.isfinite(table.specific_force)

@@ -37,7 +37,7 @@ from weighbridge.estimators.joint.slow_errors import motion_variance, with_varia
 from weighbridge.estimators.settings import differences
 from weighbridge.estimators.squat import of_vehicle
 from weighbridge.messages import Problem, phrase, refused
-from weighbridge.navigation.motion import Motion
+from weighbridge.navigation.motion import BY_SPEED, Motion
 from weighbridge.navigation.select import identify_motion, without_accelerometer
 from weighbridge.pipeline.given import (
     GivenDrive,
@@ -371,6 +371,9 @@ def _smoothed(drive: Drive, vehicle: Vehicle, track: MassTrack) -> Problem | Non
     if set(source_of(vehicle).found(drive)) & set(drive.info.trusted):
         return None
     balance, found, motion = track.balance, track.switched, track.balance.motion
+    if motion.source in BY_SPEED and track.status is not Status.CONVERGED:
+        # A calm drive has no quick changes.
+        return None
     if track.sizes is not None:
         motion = with_variance(motion, track.sizes.motion_var)
     return smoothed_torque(
