@@ -71,8 +71,8 @@ RECIPES = (
 
 def groups() -> dict[str, tuple[str, ...]]:
     """Return `GROUPS`; public names that stand in none are in one of their own."""
-    told = {name for names in GROUPS.values() for name in names} | {"fleet"}
-    rest = tuple(n for n in import_module("weighbridge").__all__ if n not in told)
+    named = {name for names in GROUPS.values() for name in names} | {"fleet"}
+    rest = tuple(n for n in import_module("weighbridge").__all__ if n not in named)
     return {**GROUPS, "Others": rest} if rest else GROUPS
 
 

@@ -755,7 +755,13 @@ def test_a_torque_that_is_held_now_and_then_is_left_out_there(fleet, kind):
 
 @pytest.mark.parametrize(
     ("kind", "factor"),
-    [("car", 1.0 / FOOT), ("truck", 1.0 / FOOT), ("electric", 1.0 / FOOT), ("car", FOOT)],
+    [
+        ("car", 1.0 / FOOT),
+        ("truck", 1.0 / FOOT),
+        ("electric", 1.0 / FOOT),
+        ("car", FOOT),
+        ("electric", -1.0),
+    ],
 )
 def test_heights_in_another_unit_are_named_by_what_hills_take(fleet, kind, factor):
     inertial = [n for n in fleet.drive(kind).signals if n.startswith(("accel_", "gyro_"))]

@@ -164,7 +164,7 @@ class Means:
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """Reading against what a second signal shows, ``reading = level + scale (told - told's mean)``.
+    """Reading against what a second signal shows, ``reading = level + scale (shown - its mean)``.
 
     Attributes
     ----------

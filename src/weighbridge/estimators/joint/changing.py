@@ -33,13 +33,13 @@ SURE: Final = 8.0
 classes, it was at most 2; a step or a ramp by a fifth in mid-drive gave 20 to 280."""
 
 DOUBTFUL: Final = 5.0
-"""The same from which a change is told as a doubt, and the mass is given [-]."""
+"""The same from which a change is reported as possible, and the mass is given [-]."""
 
 SIGNIFICANT: Final = 5.0
-"""Changes below so many standard deviations are not told [-]."""
+"""Changes below so many standard deviations are not reported [-]."""
 
 LEAST: Final = 0.08
-"""Smaller changes of the scale are not told [-]: two of 118 undamaged motorways of the accuracy
+"""Smaller changes of the scale are not reported [-]: two of 118 undamaged motorways of the accuracy
 study showed one of 0.07."""
 
 LAUNCH: Final = 1e6
