@@ -27,6 +27,7 @@ from weighbridge.estimators.joint.slow_errors import (
     WIND_STD,
     noise_variance,
 )
+from weighbridge.estimators.noisy_motion import MOSTLY
 from weighbridge.kernels import disturbance as kernel
 from weighbridge.navigation.motion import Motion
 from weighbridge.signals import Bools, Floats
@@ -50,6 +51,7 @@ class DriveRows:
     mass : known, as the drive begins [kg]
     motion : of the drive
     beside : (n,) force that the torque gives beside the wheels, shown by another fit [N]
+    motion_noise : variance of the noise in the mean specific force of a window [m^2/s^4]
     """
 
     table: ForceTable
@@ -59,6 +61,7 @@ class DriveRows:
     mass: float
     motion: Motion
     beside: Floats | float = 0.0
+    motion_noise: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -390,6 +393,7 @@ class _Design(NamedTuple):
     gearings : (n,) of each drive, by sample [1/m]
     columns : (n, k) of each drive, by sample
     mass : mean of the drives [kg]
+    noise : variance of the noise of the first column, in the mean of the windows [N^2]
     grade : what no sensor measures of it, in the drive that leaves most [rad]
     """
 
@@ -400,6 +404,7 @@ class _Design(NamedTuple):
     gearings: list[Floats]
     columns: list[Floats]
     mass: float
+    noise: float
     grade: float
 
 
@@ -433,6 +438,12 @@ def _design(
         gearings=gearings,
         columns=columns,
         mass=mass,
+        noise=float(
+            np.average(
+                [d.mass**2 * d.motion_noise for d in drives],
+                weights=[cut.count.size for cut in cuts],
+            )
+        ),
         grade=max(d.motion.unmeasured_grade for d in drives),
     )
 
@@ -473,7 +484,35 @@ def _solve(
         start, design.time, design.rows, reached,
         design.variance, np.zeros(design.rows.shape), params,
     )  # fmt: skip
-    return state  # type: ignore[no-any-return]
+    if design.noise == 0.0:
+        return state  # type: ignore[no-any-return]
+    weights = kernel.weights(
+        start, design.time, design.rows, reached,
+        design.variance, np.zeros(design.rows.shape), params,
+    )  # fmt: skip
+    return without_noise(state, design.noise * weights)
+
+
+def without_noise(state: kernel.DisturbanceState, information: float) -> kernel.DisturbanceState:
+    """Take the noise of the first regressor out of what the rows show.
+
+    Least squares takes the square of a noisy regressor for information: slopes over it come out
+    too small, and what goes along with it takes their place.
+
+    Parameters
+    ----------
+    state : after all rows
+    information : the trace of their weights times the variance of that noise
+
+    References
+    ----------
+    Fuller, Measurement Error Models, 1987, ch. 2.2.
+    """
+    gain = state.cov[:, 0]
+    noise = information / (1.0 - min(information * float(gain[0]), MOSTLY))
+    return state._replace(
+        x=state.x + gain * noise * state.x[0], cov=state.cov + noise * np.outer(gain, gain)
+    )
 
 
 def _fitted(

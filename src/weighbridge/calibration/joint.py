@@ -40,7 +40,7 @@ from weighbridge.calibration.self_weighing import (
 )
 from weighbridge.estimators import joint
 from weighbridge.estimators.joint.problem import UNMODELLED
-from weighbridge.estimators.joint.switched import Switched
+from weighbridge.estimators.track import MassTrack
 from weighbridge.messages import Problem as Message
 from weighbridge.messages import phrase, refused
 from weighbridge.results.calibration import DelaySearch
@@ -165,10 +165,12 @@ def _likeliest(problem: Problem) -> tuple[Fitted, Floats]:
     found = fit_with_gusts(given, settings)
     _refuse_strange(problem, found, rows, settings)
     first = replace(_with(problem.draft, found, settings), timing=timing)
-    beside = _accessories(problem, first)
-    if any(beside):
-        found = fit_with_gusts(_without(given, beside, first), settings)
-        _refuse_strange(problem, found, rows, settings)
+    tracks = [
+        joint.estimate(balance, first, load_changes=False) for balance in rebalanced(problem, first)
+    ]
+    beside = [track.switched for track in tracks]
+    found = fit_with_gusts(_as_shown(given, tracks, first), settings)
+    _refuse_strange(problem, found, rows, settings)
     powers = [one.power for one in beside if one is not None]
     vehicle = _with(problem.draft, found, settings)
     speeds, loads = ranges(problem, rows)
@@ -204,22 +206,19 @@ def _refuse_strange(
         )
 
 
-def _accessories(problem: Problem, vehicle: Vehicle) -> list[Switched | None]:
-    """Find in each drive, by a first fit, what the engine drives on and off beside the wheels."""
-    return [
-        joint.estimate(balance, vehicle, load_changes=False).switched
-        for balance in rebalanced(problem, vehicle)
-    ]
-
-
-def _without(
-    drives: Sequence[DriveRows], beside: Sequence[Switched | None], vehicle: Vehicle
+def _as_shown(
+    drives: Sequence[DriveRows], tracks: Sequence[MassTrack], vehicle: Vehicle
 ) -> list[DriveRows]:
-    """Let the rows of drives know what the engine drives beside the wheels."""
-    return [
-        rows if found is None else replace(rows, beside=found.force(rows.table, vehicle))
-        for rows, found in zip(drives, beside, strict=True)
-    ]
+    """Let rows know what weighing by a first fit shows: accessories, and noise of the motion."""
+    shown = []
+    for rows, track in zip(drives, tracks, strict=True):
+        if track.switched is not None:
+            rows = replace(rows, beside=track.switched.force(rows.table, vehicle))
+        if track.sizes is not None and track.filter_input is not None:
+            noise = track.sizes.noise_information / track.filter_input.weight()
+            rows = replace(rows, motion_noise=noise)
+        shown.append(rows)
+    return shown
 
 
 def _rows(problem: Problem, delay: float, lag: float) -> tuple[DelayedRows, ...]:

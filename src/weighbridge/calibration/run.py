@@ -185,6 +185,7 @@ def run_calibration(
             samples=int(rows.time.size),
             motion=motions.pop() if len(motions) == 1 else None,
             unmeasured_grade=_unmeasured_grade(problem),
+            torque_period=_torque_period(problem),
         ),
     )
     balances = tuple(rebalanced(problem, done))
@@ -240,6 +241,11 @@ def _unmeasured_grade(problem: Problem) -> float:
     """What of the grade nothing has measured, over all drives [rad]."""
     left = [r.motion.unmeasured_grade for r in problem.recordings]
     return round(float(np.sqrt(np.mean(np.square(left)))), 5)
+
+
+def _torque_period(problem: Problem) -> float:
+    """From one sample of the torque to the next, the longest of all drives [s]."""
+    return round(max(r.source.carrier(r.drive).period for r in problem.recordings), 3)
 
 
 def _stated_reference(drives: Sequence[Drive], problem: Problem) -> float | None:

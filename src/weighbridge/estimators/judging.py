@@ -108,6 +108,26 @@ def lacks_accelerometer(vehicle: Vehicle, motion: Motion) -> bool:
     return with_one and motion.source in BY_SPEED
 
 
+RATES_APART: Final = 2.2
+"""Times as often is another rate of the torque [-]: 5 Hz with a file of 10 Hz moves the masses of
+a truck by 1 to 2 %, 2 Hz by 3 to 9 %."""
+
+
+def sampled_otherwise(vehicle: Vehicle, balance: ForceBalance) -> float | None:
+    """From one torque to the next where it is another one than in the calibration and matters [s].
+
+    It matters without an accelerometer and where hills slow a vehicle down: how much of the motion
+    is noise shows less well between samples that are further apart.
+    """
+    then, time = vehicle.provenance.torque_period, balance.table.time
+    if then is None or not vehicle.of_class.underpowered or time.size < 2:
+        return None
+    now = float(np.median(np.diff(time)))
+    if balance.motion.source not in BY_SPEED or 1.0 / RATES_APART < now / then < RATES_APART:
+        return None
+    return now
+
+
 def grade_apart(vehicle: Vehicle, motion: Motion) -> float:
     """How much surer or less sure the grade of a drive is than that of the calibration [rad].
 

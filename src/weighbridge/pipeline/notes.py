@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from typing import Any, Final
 
+from weighbridge.balance import ForceBalance
 from weighbridge.balance.speed_balance import SPEEDS
 from weighbridge.estimators import ESTIMATORS, MassTrack, Status
-from weighbridge.estimators.judging import grade_apart, lacks_accelerometer
+from weighbridge.estimators.judging import grade_apart, lacks_accelerometer, sampled_otherwise
 from weighbridge.messages import Problem, phrase
-from weighbridge.navigation.motion import Motion
 from weighbridge.signals import Drive
 from weighbridge.vehicle.data_sheet import needs_calibration, wheel_efficiency
 from weighbridge.vehicle.model import Vehicle
@@ -55,10 +55,21 @@ GRADES_APART: Final = 0.003
 """Grades known better or worse than in the calibration by so much are reported [rad]."""
 
 
-def other_equipment(vehicle: Vehicle, motion: Motion) -> tuple[Problem, ...]:
-    """Say where calibration and drive had another accelerometer or grade; nothing if not."""
+def other_equipment(vehicle: Vehicle, balance: ForceBalance) -> tuple[Problem, ...]:
+    """Say where calibration and drive were recorded otherwise; nothing if not.
+
+    That is with another accelerometer, grade or rate of the torque.
+    """
+    motion, made = balance.motion, vehicle.provenance
+    period = sampled_otherwise(vehicle, balance)
+    if period is not None:
+        return (
+            Problem.of(
+                "torque.other_rate", now=period, then=made.torque_period, vehicle=vehicle.name
+            ),
+        )
     if grade_apart(vehicle, motion) > GRADES_APART:
-        now, then = motion.unmeasured_grade, vehicle.provenance.unmeasured_grade or 0.0
+        now, then = motion.unmeasured_grade, made.unmeasured_grade or 0.0
         return (
             Problem.of(
                 "motion.grade_apart",

@@ -492,7 +492,7 @@ def torque_balance(drive: Drive, vehicle: Vehicle) -> tuple[ForceBalance, tuple[
     if begun is None or begun.delay != delay:
         begun = force_balance(drive, vehicle, motion, delay=delay)
     balance = replace(begun, navigation=navigation)
-    return balance, notes + other_equipment(vehicle, motion) + balance.notes
+    return balance, notes + other_equipment(vehicle, balance) + balance.notes
 
 
 def _other_clock(

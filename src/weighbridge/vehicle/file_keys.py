@@ -328,6 +328,12 @@ SECTIONS: Final[dict[str, tuple[type[Any], tuple[Key, ...]]]] = {
                 suffix="rad",
             ),
             Key(
+                "torque_period",
+                "torque_period",
+                "from one sample of the torque to the next in them",
+                suffix="s",
+            ),
+            Key(
                 "mass_scale_std",
                 "mass_scale_std",
                 "part of any mass weighed with this file, as standard deviation",

@@ -29,6 +29,8 @@ class Provenance:
     motion : how the motion of the drives was found, as `weighbridge.navigation.Motion.source`
     unmeasured_grade : what of the grade nothing had measured in the drives, as standard deviation
         [rad]; None where it is not known
+    torque_period : from one sample of the torque to the next in the drives [s]; None where it is
+        not known
     mass_scale_std : relative standard deviation that the calibration leaves in
         every mass weighed with it [-]
     std_factor : scatter of parts of the calibration's drives over what the filter says of it [-];
@@ -56,6 +58,7 @@ class Provenance:
     method: str | None = None
     motion: str | None = None
     unmeasured_grade: float | None = None
+    torque_period: float | None = None
     mass_scale_std: float | None = None
     std_factor: float | None = None
     highest_torque: float | None = None
@@ -69,6 +72,7 @@ class Provenance:
     def __post_init__(self) -> None:
         not_negative("unmeasured_grade", self.unmeasured_grade)
         within("unmeasured_grade", self.unmeasured_grade, 0.0, 1.0, "rad")
+        positive("torque_period", self.torque_period)
         not_negative("mass_scale_std", self.mass_scale_std)
         within("mass_scale_std", self.mass_scale_std, 0.0, 1e3)
         positive("std_factor", self.std_factor)

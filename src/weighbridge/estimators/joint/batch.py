@@ -50,6 +50,7 @@ from weighbridge.estimators.judging import (
     judge,
     lacks_accelerometer,
     nothing,
+    sampled_otherwise,
 )
 from weighbridge.estimators.noisy_motion import (
     UNANSWERED_STD,
@@ -93,6 +94,10 @@ simulator came out 3.4 % (RMS) light with heights, and 10 % without."""
 UNCALIBRATED_MOTION_STD: Final[dict[MotionSource, float]] = {"speed_grade": 0.05, "speed": 0.09}
 """The same where a data sheet is all there is, beside `JOINT_MOTION_STD`, of classes whose noise
 of the motion is not known [-]."""
+
+OTHER_RATE_STD: Final = 0.04
+"""The same where the torque of the calibration came at another rate, see `sampled_otherwise` [-]:
+of ten trucks of two simulators, 1 Hz with a file of 5 Hz and the other way round."""
 
 UNTOLD_RETARDER_STD: Final = 0.08
 """The same of a data sheet alone where a retarder may work that nothing reports [-]: nine drives
@@ -396,8 +401,7 @@ def _attenuating(
     found = unmeasured_noise(
         np.where(solved.taken, solved.weight, 0.0),
         solved.noise,
-        min(solved.fast, 1.0) ** 2 * cut.mean(table.force_std**2) / cut.count
-        + between_samples(table.time, table.traction_force, table.usable) / cut.count,
+        between_samples(table.time, table.traction_force, table.usable) / cut.count,
         short_of_power(cut.mean(np.nan_to_num(table.torque))),
         GRAVITY * np.interp(cut.mean(table.time), motion.time, motion.grade_std),
         float(solved.x[-1, 0]),
@@ -485,6 +489,8 @@ def _systematic_std(balance: ForceBalance, vehicle: Vehicle, mass: float) -> flo
         left = float(np.hypot(left, HIDDEN_BRAKE_STD))
     if lacks_accelerometer(vehicle, balance.motion):
         left = float(np.hypot(left, OTHER_MOTION_STD[balance.motion.source]))
+    if sampled_otherwise(vehicle, balance) is not None:
+        left = float(np.hypot(left, OTHER_RATE_STD))
     if by_data_sheet(vehicle) and balance.motion.source in BY_SPEED:
         if not vehicle.of_class.underpowered:
             left = float(np.hypot(left, UNCALIBRATED_MOTION_STD[balance.motion.source]))
