@@ -161,7 +161,7 @@ def unmeasured_noise(
     return np.asarray(part / (1.0 + mass_var * float(np.sum(weight * part))))
 
 
-BETWEEN: Final = 0.5
+OF_A_WALK: Final = 0.5
 """Part of the variance of a random walk that the mean of a torque has about straight lines [-]: a
 driver and a controller change it by ramps. In windows of four trucks of two simulators it is 0.1 to
 0.4 at 2 Hz and 0.3 to 0.9 at 1 Hz."""
@@ -171,8 +171,8 @@ def between_samples(time: Floats, force: Floats, usable: Bools) -> float:
     """Variance of the mean force from one sample to the next, over their straight line [N^2].
 
     A force that walks at random by ``d`` from sample to sample has a mean between both with the
-    variance ``d^2 / 12`` about that of the straight line (Brownian bridge), and a torque `BETWEEN`
-    of it. Samples that shifts, brakes or gaps part are left out.
+    variance ``d^2 / 12`` about that of the straight line (Brownian bridge). Samples that shifts,
+    brakes or gaps part are left out.
 
     Parameters
     ----------
@@ -189,7 +189,7 @@ def between_samples(time: Floats, force: Floats, usable: Bools) -> float:
     if not beside.any():
         return 0.0
     beside &= step < 2.0 * np.median(step[beside])
-    return BETWEEN * float(np.mean(change[beside] ** 2)) / 12.0
+    return float(np.mean(change[beside] ** 2)) / 12.0
 
 
 def short_of_power(torque: Floats) -> Bools:

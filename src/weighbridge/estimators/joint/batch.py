@@ -53,6 +53,7 @@ from weighbridge.estimators.judging import (
     sampled_otherwise,
 )
 from weighbridge.estimators.noisy_motion import (
+    OF_A_WALK,
     UNANSWERED_STD,
     MotionNoise,
     attenuation,
@@ -401,7 +402,7 @@ def _attenuating(
     found = unmeasured_noise(
         np.where(solved.taken, solved.weight, 0.0),
         solved.noise,
-        between_samples(table.time, table.traction_force, table.usable) / cut.count,
+        OF_A_WALK * between_samples(table.time, table.traction_force, table.usable) / cut.count,
         short_of_power(cut.mean(np.nan_to_num(table.torque))),
         GRAVITY * np.interp(cut.mean(table.time), motion.time, motion.grade_std),
         float(solved.x[-1, 0]),
