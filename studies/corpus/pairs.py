@@ -555,11 +555,28 @@ def _other_sensors() -> Iterator[Pair]:
             )  # fmt: skip
 
 
+def _other_rates() -> Iterator[Pair]:
+    """Trucks without inertial sensor whose torque came at another rate in the calibration."""
+    slow, fast = "no IMU, OBD 1 Hz", "no IMU"
+    drives = [("own truck", "drive"), ("foreign truck", "drive0"), ("foreign truck", "drive3")]
+    for of in ("second truck", "second semi"):
+        drives += [(of, "ordinary"), (of, "motorway")]
+    for of, name in drives:
+        for made_by, seen, slice in (
+            (fast, slow, "calibrated fast, weighed at 1 Hz"),
+            (slow, fast, "calibrated at 1 Hz, weighed fast"),
+        ):
+            yield Pair(
+                f"{of}/{name}/{slice}", f"sound: {slice} (truck)", of, made_by,
+                partial(_seen, drive=name, equipment=seen), sound=True,
+            )  # fmt: skip
+
+
 def all_pairs() -> list[Pair]:
     """List all pairs, in an order that stays."""
     return [
         *_of_equipment(), *_cuts(), *_faults(), *_heights(), *_recordings(), *_strangers(),
-        *_misread_pairs(), *_in_feet(), *_other_sensors(),
+        *_misread_pairs(), *_in_feet(), *_other_sensors(), *_other_rates(),
     ]  # fmt: skip
 
 

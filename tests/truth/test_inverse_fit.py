@@ -8,6 +8,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from weighbridge.balance import ForceTable
+from weighbridge.balance.averaging import WINDOW
 from weighbridge.calibration.inverse import (
     DriveRows,
     FitSettings,
@@ -84,6 +85,25 @@ def test_the_map_is_found_where_the_motion_is_noisy(motion_noise):
     # A reading that stands on both sides explains itself and leaves nothing to the motion.
     assert slope == pytest.approx(SCALE + LEAN * engine, rel=0.05)
     assert found.road[0] == pytest.approx(DRAG_AREA, abs=0.2)
+
+
+@pytest.mark.parametrize("known", [False, True])
+def test_noise_of_a_measured_motion_is_not_taken_for_information(known):
+    rng = np.random.default_rng(5)
+    noise, drives = 0.25, []
+    for _ in range(2):
+        drive = made(rng, 0.0)
+        seen = drive.table.specific_force + rng.normal(0.0, noise, drive.table.time.size)
+        table = replace(drive.table, specific_force=seen, accel=seen)
+        per_window = noise**2 * 0.5 / WINDOW if known else 0.0
+        drives.append(replace(drive, table=table, motion_noise=per_window))
+    settings = replace(settings_of_load(), order=0, curved=False)
+    straight = np.polyfit(drives[0].table.engine_speed, growing(drives[0].table.engine_speed), 0)
+    slope = fit(drives, settings).coefficients[1] / straight[0]
+    if known:
+        assert slope == pytest.approx(1.0, abs=0.03)
+    else:
+        assert slope > 1.1
 
 
 def test_masses_far_apart_pin_the_rolling_resistance():
