@@ -43,6 +43,7 @@ from weighbridge.estimators.joint.problem import UNMODELLED
 from weighbridge.estimators.track import MassTrack
 from weighbridge.messages import Problem as Message
 from weighbridge.messages import phrase, refused
+from weighbridge.navigation.motion import BY_SPEED
 from weighbridge.results.calibration import DelaySearch
 from weighbridge.signals import Floats
 from weighbridge.vehicle.model import Driveline, Provenance, RoadLoad, Timing, Vehicle
@@ -209,12 +210,17 @@ def _refuse_strange(
 def _as_shown(
     drives: Sequence[DriveRows], tracks: Sequence[MassTrack], vehicle: Vehicle
 ) -> list[DriveRows]:
-    """Let rows know what weighing by a first fit shows: accessories, and noise of the motion."""
+    """Let rows know what weighing by a first fit shows: accessories, and noise of hills.
+
+    Noise of an accelerometer is a tenth of that and less. With it, 17 undamaged drives of the
+    corpus went from 2.1 to 2.5 % RMS, and 8 foreign ones from 0.59 to 0.72 %.
+    """
     shown = []
     for rows, track in zip(drives, tracks, strict=True):
         if track.switched is not None:
             rows = replace(rows, beside=track.switched.force(rows.table, vehicle))
-        if track.sizes is not None and track.filter_input is not None:
+        by_speed = rows.motion.source in BY_SPEED
+        if by_speed and track.sizes is not None and track.filter_input is not None:
             noise = track.sizes.noise_information / track.filter_input.weight()
             rows = replace(rows, motion_noise=noise)
         shown.append(rows)
