@@ -169,10 +169,11 @@ def _likeliest(problem: Problem) -> tuple[Fitted, Floats]:
     tracks = [
         joint.estimate(balance, first, load_changes=False) for balance in rebalanced(problem, first)
     ]
-    beside = [track.switched for track in tracks]
-    found = fit_with_gusts(_as_shown(given, tracks, first), settings)
-    _refuse_strange(problem, found, rows, settings)
-    powers = [one.power for one in beside if one is not None]
+    shown = _as_shown(given, tracks, first)
+    if any(one is not before for one, before in zip(shown, given, strict=True)):
+        found = fit_with_gusts(shown, settings)
+        _refuse_strange(problem, found, rows, settings)
+    powers = [track.switched.power for track in tracks if track.switched is not None]
     vehicle = _with(problem.draft, found, settings)
     speeds, loads = ranges(problem, rows)
     vehicle = replace(
