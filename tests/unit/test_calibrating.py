@@ -419,6 +419,24 @@ def test_a_drive_without_the_accelerometer_of_its_calibration_says_so(empty, car
     assert not any(t.id == "motion.no_accelerometer" for t in weigh(empty.drive, car).problems)
 
 
+def test_a_torque_at_another_rate_than_in_the_calibration_widens_the_interval(empty, car):
+    signals = empty.drive.signals.items()
+    blind = replace(
+        empty.drive, signals={n: s for n, s in signals if n[:5] not in ("accel", "gyro_")}
+    )
+    period = car.provenance.torque_period
+    found = []
+    for then in (period, 5.0 * period):
+        made = replace(car.provenance, motion="speed_grade", torque_period=then)
+        found.append(weigh(blind, replace(car, kind="truck", provenance=made)))
+    same, other = found
+    assert not any(p.id == "torque.other_rate" for p in same.problems)
+    said = next(p for p in other.problems if p.id == "torque.other_rate")
+    assert said.values["now"] == pytest.approx(period, rel=0.05)
+    wider = np.sqrt(other.result.std**2 - same.result.std**2)
+    assert wider == pytest.approx(0.04 * other.result.mass, rel=0.02)
+
+
 def test_thirds_of_the_drives_show_how_masses_scatter(monkeypatch, car, loaded):
     """Errors of three, three and no standard deviations, beside what is expected beforehand."""
     balance = weigh(loaded.drive, car).result.balance
