@@ -30,7 +30,7 @@ def block(tmp_path, weighing, **options):
 
 
 @pytest.mark.parametrize(
-    ("share", "name"), [(0.019, "fine"), (0.049, "good"), (0.099, "fair"), (0.24, "rough")]
+    ("share", "name"), [(0.019, "fine"), (0.0487, "good"), (0.099, "fair"), (0.24, "rough")]
 )
 def test_the_grade_is_that_of_the_interval(tmp_path, share, name):
     html = block(tmp_path, weighed(share * MASS / REACH))
