@@ -11,7 +11,7 @@ import weighbridge as wb
 from weighbridge import Signal
 from weighbridge.balance import Reason
 from weighbridge.balance.averaging import windows
-from weighbridge.estimators import joint
+from weighbridge.estimators import ESTIMATORS
 from weighbridge.estimators.joint import batch
 from weighbridge.estimators.joint import forward as joint_forward
 from weighbridge.estimators.joint.slow_errors import DATA_SHEET_NAMES, design, usable_rows
@@ -19,6 +19,8 @@ from weighbridge.estimators.noisy_motion import too_low
 from weighbridge.report.slow_section import constants_table
 from weighbridge.simulation import MIDSIZE, Scenario, short_route, simulate_car
 from weighbridge.vehicle.model import Driveline, TorqueModel
+
+joint = ESTIMATORS["joint"]
 
 LOADED = 400.0
 
@@ -85,7 +87,7 @@ def test_a_body_that_leans_with_its_load_costs_little(balance, car):
     def off(settings):
         return abs(joint.estimate(leaning, car, settings).mass / upright - 1.0)
 
-    assert off(None) < 0.8 * off(joint.JointSettings(load_pitch_std=0.0))
+    assert off(None) < 0.8 * off(joint.settings(load_pitch_std=0.0))
 
 
 def test_torque_errors_that_act_through_the_gear_weigh_less_in_short_gears(

@@ -22,7 +22,7 @@ from tests.unit.test_weighing import weighing as weighed_by_rls
 
 from weighbridge import ConfigError, Drive, DriveInfo, Signal, Weighing, compare
 from weighbridge.balance import ForceBalance, ForceTable, Reason
-from weighbridge.estimators import ESTIMATORS, joint
+from weighbridge.estimators import ESTIMATORS
 from weighbridge.navigation.motion import Motion
 from weighbridge.report import write_report
 from weighbridge.vehicle.model import Provenance
@@ -111,7 +111,7 @@ def driven(
         fuel_burnt=np.zeros(n),
         reason=reason,
     )
-    track = joint.estimate(ForceBalance(motion=motion, table=forces), CAR)
+    track = ESTIMATORS["joint"].track(ForceBalance(motion=motion, table=forces), CAR)
     # A vehicle feels half of the wind that a weather station measures 10 m high.
     told = np.hypot(*reported) / 0.5
     info = DriveInfo(wind_speed=told or None, wind_from=np.arctan2(reported[1], reported[0]))

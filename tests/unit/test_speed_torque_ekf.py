@@ -267,12 +267,9 @@ def test_without_a_calibration_both_jacobians_widen_the_interval():
     apart = abs(math.log(turned.result.mass / known.result.mass))
     assert apart > 0.01
     sheet = wb.weigh(noisy, CAR, METHOD)
-    share = speed_torque_ekf.BOUNDS_SHARE * apart
-    found = speed_torque_ekf.jacobian_std(
-        sheet.result.balance, CAR, speed_torque_ekf.SpeedTorqueSettings(), sheet.result.mass
-    )
-    assert found == pytest.approx(share, rel=0.05)
-    assert sheet.std / sheet.mass > share
+    # Half of what they are apart is one standard deviation at the least.
+    assert 0.5 * apart < sheet.std / sheet.mass
+    assert known.std / known.mass < sheet.std / sheet.mass
 
 
 def test_a_grade_that_is_less_sure_than_in_the_calibration_widens_the_interval(calibrated, third):
@@ -281,7 +278,7 @@ def test_a_grade_that_is_less_sure_than_in_the_calibration_widens_the_interval(c
     assert not any(p.id == "motion.grade_apart" for p in third.problems)
     assert any(p.id == "motion.grade_apart" for p in blind.problems)
     apart = 0.02 - calibrated.provenance.unmeasured_grade
-    assert blind.std / blind.mass > speed_torque_ekf.GRADE_STD * apart
+    assert blind.std / blind.mass > apart
     assert abs(blind.mass - (MASS + 150.0)) < 2.0 * blind.std
 
 

@@ -10,7 +10,7 @@ from scipy.ndimage import uniform_filter1d
 import weighbridge as wb
 from weighbridge import Drive, Signal
 from weighbridge.constants import GRAVITY
-from weighbridge.estimators import joint
+from weighbridge.estimators import ESTIMATORS
 from weighbridge.estimators.squat import (
     DRIVE_STD,
     SQUAT,
@@ -33,6 +33,8 @@ from weighbridge.simulation import (
     simulate_car,
 )
 from weighbridge.vehicle.classes import VEHICLE_CLASSES
+
+joint = ESTIMATORS["joint"]
 
 K = 0.004
 """Pitch per specific force [rad per m/s^2]."""

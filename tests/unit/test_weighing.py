@@ -14,8 +14,8 @@ from tests.unit.test_balance import CAR, CLOCK, MASS, STAMPS, accel_at, drive, m
 
 from weighbridge import ConfigError, Drive, DriveInfo, Signal, Status, Weighing, weigh
 from weighbridge.balance import force_balance
+from weighbridge.estimators import ESTIMATORS
 from weighbridge.estimators.judging import uncalibrated_std
-from weighbridge.estimators.rls import estimate
 from weighbridge.pipeline.notes import overload
 from weighbridge.pipeline.weighing import without_mass
 from weighbridge.results.row import unread_row
@@ -37,7 +37,7 @@ FIELDS = {
 def weighing(vehicle=CAR, status=None, **changes):
     noise = np.random.default_rng(3).normal(scale=2.0, size=STAMPS.size)
     recorded = drive(torque=weighable() + noise)
-    track = estimate(force_balance(recorded, vehicle, motion(**changes)), vehicle)
+    track = ESTIMATORS["rls"].track(force_balance(recorded, vehicle, motion(**changes)), vehicle)
     return Weighing(
         drive=recorded,
         vehicle=vehicle,
