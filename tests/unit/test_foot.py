@@ -8,6 +8,7 @@ from numpy.testing import assert_allclose
 
 from weighbridge import Drive, Signal, Vehicle
 from weighbridge.balance import Reason, force_balance
+from weighbridge.balance.floor import Floor, find_floor
 from weighbridge.constants import GRAVITY
 from weighbridge.kernels import two_states
 from weighbridge.navigation.motion import Motion
@@ -280,3 +281,21 @@ def test_two_states_equal_the_sum_over_all_paths():
         total += weight
         first += weight * bits
     assert_allclose(two_states.posterior(ratio, time, stay, np.inf), first / total, rtol=1e-9)
+
+
+def test_the_floor_is_that_of_engine_speeds_at_which_it_was_dragged():
+    random = np.random.default_rng(2)
+    turning = random.uniform(100.0, 400.0, 8000)
+    dragged = (random.random(8000) < 0.2) & (turning < 250.0)
+    read = np.where(dragged, 0.05 + 1e-4 * turning, random.uniform(0.25, 1.0, 8000))
+    floor = find_floor(read + 0.004 * random.standard_normal(8000), turning)
+    assert_allclose(floor.at(np.array([120.0, 200.0])), [0.062, 0.07], atol=0.012)
+    # Never dragged at 380 rad/s: lowest readings there are no floor.
+    assert floor.at(np.array([380.0]))[0] < 0.2
+    assert find_floor(random.uniform(0.4, 1.0, 8000), turning) is None
+
+
+def test_the_floor_of_the_file_follows_a_small_drift_alone():
+    file = Floor(np.array([100.0, 200.0, 300.0]), np.array([0.05, 0.05, 0.05]), 0.01, 0.8)
+    drive = Floor(np.array([100.0, 200.0, 300.0]), np.array([0.06, 0.04, 0.2]), 0.01, 0.8)
+    assert_allclose(file.lifted(drive).level, [0.06, 0.05, 0.05])
