@@ -22,8 +22,8 @@ from weighbridge.estimators.squat import (
     squat_by_speed,
 )
 from weighbridge.navigation.inertial import inertial_motion
-from weighbridge.navigation.longitudinal import longitudinal_motion
 from weighbridge.navigation.motion import with_squat
+from weighbridge.navigation.select import find_motion
 from weighbridge.simulation import (
     MIDSIZE,
     Scenario,
@@ -156,7 +156,7 @@ def along(k, *, hills=0.02, seconds=900.0, swing=1.0, seed=4):
         "longitudinal_accel": Signal("longitudinal_accel", time, read),
         "vehicle_speed": Signal("vehicle_speed", time, speed),
     }
-    return longitudinal_motion(Drive("d", signals))
+    return find_motion(Drive("d", signals))
 
 
 @pytest.mark.parametrize("k", [0.0, 0.005])
