@@ -169,7 +169,7 @@ def test_encodings_that_the_bytes_are_not(weighbridge, tmp_path, encoding):
 def test_a_header_of_ten_million_commas(refused, tmp_path):
     log = tmp_path / "x.csv"
     log.write_bytes(b"," * 10_000_000 + b"\n1,2\n")
-    refused("inspect", log, said="10000001 columns")
+    refused("inspect", log, said="10000001")
 
 
 def test_a_parquet_of_many_columns(tmp_path):

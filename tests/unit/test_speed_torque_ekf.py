@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -10,7 +11,8 @@ from tests.noted import error
 import weighbridge as wb
 from weighbridge import ConfigError, Drive, Signal, Vehicle
 from weighbridge.balance import Reason
-from weighbridge.estimators import ESTIMATORS
+from weighbridge.estimators import ESTIMATORS, speed_torque_ekf
+from weighbridge.estimators.speed_samples import covered, sampled, span_means
 from weighbridge.vehicle.model import Driveline, RoadLoad, Timing, TorqueModel
 
 METHOD = "speed-torque-ekf"
@@ -161,6 +163,31 @@ def test_linearised_at_its_own_acceleration_noise_of_the_torque_makes_it_heavier
     assert ends[False] > 1.015 * ends[True]
 
 
+def test_noise_of_speed_and_of_force_weigh_the_two_accelerations():
+    balance = wb.weigh(drive(), CAR, METHOD).result.balance
+    settings = speed_torque_ekf.SpeedTorqueSettings()
+    _, table = sampled(balance, CAR, 1.0)
+    quiet = speed_torque_ekf.parameters(balance, CAR, settings, MASS, np.full(3, -9.0))
+    table = table._replace(force_var=np.zeros_like(table.force_var))
+
+    def share(**noise):
+        ends = [
+            speed_torque_ekf.blended(
+                table._replace(accel=table.accel + by), quiet._replace(**noise), MASS
+            ).accel
+            for by in (0.0, 1.0)
+        ]
+        return np.nanmedian(ends[1] - ends[0])
+
+    assert share(speed_var=1e-12, slope_var=0.0, accel_density=1.0) == pytest.approx(1.0)
+    assert share(speed_var=1.0, slope_var=0.0, accel_density=1e-12) == pytest.approx(0.0, abs=1e-6)
+    both = share(speed_var=0.5, slope_var=0.0, accel_density=1.0, gust_speed=1e9)
+    assert both == pytest.approx(0.5 / 1.5, rel=0.01)
+    known = speed_torque_ekf.blended(table, quiet._replace(slope_var=1.0), MASS, 0.0).accel
+    unknown = speed_torque_ekf.blended(table, quiet._replace(slope_var=1.0), MASS).accel
+    assert np.nanmax(np.abs(known - unknown)) > 0.05
+
+
 def test_residual_reason_and_running_mass_are_of_the_rows(weighed):
     track = weighed.result
     n = track.balance.table.time.size
@@ -251,3 +278,24 @@ def test_a_grade_that_is_less_sure_than_in_the_calibration_widens_the_interval(c
     apart = 0.02 - calibrated.provenance.unmeasured_grade
     assert blind.std / blind.mass > apart
     assert abs(blind.mass - (MASS + 150.0)) < 2.0 * blind.std
+
+
+def test_means_over_spans_are_those_of_the_line_between():
+    time = np.array([0.0, 1.0, 3.0, 4.0])
+    values = np.array([0.0, 2.0, 2.0, 0.0])
+    edges = np.array([0.0, 0.5, 2.0, 3.5])
+    fine = np.linspace(0.0, 4.0, 400_001)
+    line = np.interp(fine, time, values)
+    expected = [line[(fine > a) & (fine <= b)].mean() for a, b in pairwise(edges)]
+    np.testing.assert_allclose(span_means(time, values, edges)[1:], expected, rtol=1e-4)
+
+
+def test_a_span_counts_only_with_all_its_rows():
+    time = np.arange(0.0, 10.0, 0.5)
+    known = np.ones(time.size, dtype=bool)
+    known[8] = False  # 4.0 s: what reaches over it, or begins within its line
+    edges = np.arange(0.25, 9.0, 1.0)
+    on = covered(time, known, edges)
+    assert edges[~on].tolist() == [0.25, 4.25, 5.25]
+    gone = (time < 5.0) | (time > 7.6)
+    assert not covered(time[gone], known[gone], edges)[6:8].any()
