@@ -77,3 +77,10 @@ def reported(drives, segments=(), **how) -> FleetReport:
             own = [{n: s[n] for n in inner} for s in segments if s["key"] == row["key"]]
             write_part(folder, row["key"], [row | {"segments": own}])
         return report(folder, **how)
+
+
+def write_learnt(folder, rows):
+    """Write what a run learnt of vehicles into its results."""
+    columns = report(folder).learnt.drop("drifts", "verdict").schema
+    frame = pl.DataFrame(list(rows), schema=columns, orient="row")
+    frame.write_parquet(Path(folder) / "learnt.parquet")
