@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from tests.noted import error
 
 from weighbridge import ConfigError, Vehicle
+from weighbridge.estimators.considered import pinned
 from weighbridge.vehicle.file import save_vehicle
 from weighbridge.vehicle.model import (
     WITNESS_TERMS,
@@ -25,6 +26,7 @@ from weighbridge.vehicle.model import (
     Timing,
     TorqueModel,
 )
+from weighbridge.vehicle.rounding import covariance_texts
 
 positive = st.floats(1e-6, 1e6)
 finite = st.floats(-1e9, 1e9)
@@ -228,6 +230,22 @@ def test_numbers_are_rounded_to_their_uncertainty(tmp_path):
     # Once rounded, it is written as it is.
     loaded.save(tmp_path / "again.toml")
     assert (tmp_path / "again.toml").read_text(encoding="utf-8") == text
+
+
+def test_a_covariance_with_a_known_combination_is_rounded_and_keeps_it():
+    """The scale of every mass is taken out of it, which leaves it singular."""
+    rng = np.random.default_rng(5)
+    parts = rng.normal(size=(6, 6)) * np.array([1.0, 1e-2, 1e-3, 0.3, 1e-3, 2.0])
+    known = rng.normal(size=6)
+    cov = pinned(parts.T @ parts, known)
+    rows = np.tril_indices(6)
+    texts = covariance_texts(tuple(cov[rows]), exact=False)
+    assert max(len(t.strip("-0.").replace(".", "")) for t in texts) <= 9
+    again = np.zeros((6, 6))
+    again[rows] = [float(t) for t in texts]
+    again += np.tril(again, -1).T
+    apart = np.sum((known * np.sqrt(np.diag(cov))) ** 2)
+    assert abs(known @ again @ known) < 1e-7 * apart
 
 
 def test_file_speaks_the_units_of_people(tmp_path):
