@@ -224,6 +224,8 @@ def test_devices_and_new_files_are_free(taken, drive, tmp_path):
     assert taken(drive / "new.csv", "--track", drive / "new.csv")
     assert taken(tmp_path / "a", "--report", tmp_path / "a", "--json", "-")
     assert taken(tmp_path / "new", "convert", drive, tmp_path / "new")
+    assert taken(drive / "sub", "convert", drive, drive / "sub")
+    assert any(p.stem == "imu" for p in (drive / "sub").iterdir())
     assert not taken(drive, "convert", drive, drive)
 
 
