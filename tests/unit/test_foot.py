@@ -79,8 +79,10 @@ def reasons(drive, car=CAR, **balance):
 
 def near(mask, reach):
     """Return the stamps within a time of a marked one."""
-    distance = np.abs(STAMPS[:, np.newaxis] - STAMPS[mask])
-    return np.min(distance, axis=1) <= reach
+    marked = STAMPS[mask]
+    after = np.clip(np.searchsorted(marked, STAMPS), 1, marked.size - 1)
+    distance = np.minimum(np.abs(STAMPS - marked[after - 1]), np.abs(STAMPS - marked[after]))
+    return distance <= reach
 
 
 LOADED = replace(CAR, torque=TorqueModel(source="load", coefficients=(-FULL * FLOOR, FULL)))
