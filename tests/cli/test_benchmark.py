@@ -2,6 +2,7 @@
 
 import json
 import re
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,9 +13,8 @@ from website import running
 
 import weighbridge as wb
 from weighbridge import Problem
-from weighbridge.benchmark import make
 from weighbridge.benchmark.plan import CALIBRATIONS, BenchmarkSettings, plan
-from weighbridge.benchmark.run import run_benchmark
+from weighbridge.cli import main
 
 TRUCK, BY_SHEET = "truck-imu-50hz-one-1", "truck-imu-50hz-sheet-1"
 OPTIONS = (
@@ -27,8 +27,13 @@ OPTIONS = (
 def bench(tmp_path_factory):
     """Return a benchmark of two trucks, one with a drive of known mass."""
     folder = tmp_path_factory.mktemp("bench") / "bench"
-    settings = BenchmarkSettings(drives=1, minutes=6.0, only=("truck", "imu-50hz", "one", "sheet"))
-    assert make.make_benchmark(folder, settings) == 2
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(
+            sys, "argv", ["weighbridge", "benchmark", "make", "-o", str(folder), *OPTIONS]
+        )
+        with pytest.raises(SystemExit) as leaving:
+            main.run()
+    assert leaving.value.code in (0, None)
     return folder
 
 
@@ -137,14 +142,20 @@ def test_a_drive_that_cannot_be_weighed_is_a_refusal_with_its_reason(weighbridge
     assert weighbridge("benchmark", "run", tmp_path, "-o", results).code == 2
 
 
-def test_methods_weigh_for_themselves_whatever_joint_finds(bench, monkeypatch):
+def test_methods_weigh_for_themselves_whatever_joint_finds(
+    weighbridge, bench, tmp_path, monkeypatch
+):
     def contradicted(track, joined):
         return Problem.of("method.contradicted", method="rls", mass=1.0, joint_mass=2.0)
 
     drives = pl.read_csv(bench / "drives.csv")
     drives.tail(1).write_csv(bench / "drives.csv")
     monkeypatch.setattr("weighbridge.pipeline.weighing.contradicted", contradicted)
-    rows = {row["method"]: row for row in run_benchmark(bench, ["rls", "holm-ekf"])}
+    rows = {}
+    for method in ("rls", "holm-ekf"):
+        results = tmp_path / f"{method}.csv"
+        assert weighbridge("benchmark", "run", bench, "--method", method, "-o", results).code == 0
+        (rows[method],) = pl.read_csv(results).to_dicts()
     drives.write_csv(bench / "drives.csv")
     assert rows["rls"]["mass_kg"] != rows["holm-ekf"]["mass_kg"]
     car = wb.Vehicle.load(bench / BY_SHEET / "vehicle.toml")

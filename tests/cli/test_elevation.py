@@ -1,6 +1,7 @@
 """Heights of an elevation raster in place of the receiver's."""
 
 import json
+from importlib.util import find_spec
 
 import numpy as np
 import polars as pl
@@ -8,7 +9,8 @@ import pytest
 
 import weighbridge as wb
 
-rasterio = pytest.importorskip("rasterio")
+# It takes 30 MB: only the process that runs these tests has it.
+pytestmark = pytest.mark.skipif(find_spec("rasterio") is None, reason="rasterio is not installed")
 
 LAT, LON = 50.0, 8.0
 
@@ -20,6 +22,7 @@ def ground(latitude, longitude):
 
 def written(path, *, crs="EPSG:4326", units=None, scale=1.0, nodata=None, cells=900):
     """Write a raster of 0.2 by 0.2 degrees about the place, or of 20 by 20 km in metres."""
+    import rasterio
     from rasterio.transform import from_origin
     from rasterio.warp import transform
 
@@ -109,6 +112,7 @@ def test_what_cannot_be_read_is_named_with_a_remedy(tmp_path):
 
 
 def test_weigh_takes_a_raster_and_says_so(tmp_path, changed, car, weighbridge):
+    import rasterio
     from rasterio.transform import from_origin
 
     folder = changed(imu=None)

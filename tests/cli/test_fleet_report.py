@@ -7,10 +7,9 @@ from pathlib import Path
 
 import polars as pl
 import pytest
-from tests.fleet.made_rows import drive, segment
+from tests.fleet.made_rows import drive, segment, write_learnt
 from tests.noted import named
 
-from weighbridge.fleet.learnt import COLUMNS, LEARNT
 from weighbridge.fleet.schema import PART
 from weighbridge.fleet.store import Results, write_part
 
@@ -67,7 +66,7 @@ def test_the_page_answers_who_when_and_how_sure(weighbridge, results, tmp_path):
 
 
 def lesson(vehicle, **more):
-    row = dict.fromkeys(COLUMNS) | {"vehicle_id": vehicle, "drives": 5, "weighed": 5}
+    row = {"vehicle_id": vehicle, "drives": 5, "weighed": 5}
     return row | {"error_pct": 1.0, "error_std_pct": 5.0, "refined": f"{vehicle}.toml", **more}
 
 
@@ -78,7 +77,7 @@ def test_what_was_learnt_is_told_those_to_look_at_first(weighbridge, results, tm
         lesson("truck1", pitch_drift_deg=-0.4, pitch_drift_std_deg=0.1, told="the pitch drifts"),
         lesson(HOSTILE, contradicted=True, error_pct=12.0, told="5 drives contradict the file"),
     ]
-    pl.DataFrame(rows, schema=COLUMNS, orient="row").write_parquet(results / LEARNT)
+    write_learnt(results, rows)
     ran = weighbridge("fleet", "report", results, "-o", tmp_path / "fleet.html",
                       "--json", tmp_path / "fleet.json")  # fmt: skip
     assert ran.code == 0
@@ -101,7 +100,7 @@ def test_what_was_learnt_is_told_those_to_look_at_first(weighbridge, results, tm
 
 
 def test_a_damaged_file_of_what_was_learnt_is_named(weighbridge, results):
-    (results / LEARNT).write_bytes(b"PAR1")
+    (results / "learnt.parquet").write_bytes(b"PAR1")
     ran = weighbridge("fleet", "report", results)
     assert ran.code == 2
     assert named(ran.err, results / "learnt.parquet")

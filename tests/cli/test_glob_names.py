@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 import pytest
+from tests.noted import named
 
-from weighbridge import ConfigError, read_drive
-from weighbridge.cli.results import Result, inputs, refuse_results
+from weighbridge import read_drive
 from weighbridge.io import read_table
 
 GOLDEN = Path(__file__).parent.parent / "golden"
@@ -44,15 +44,18 @@ def test_a_name_with_an_equals_sign_is_no_partition(tmp_path):
     assert read_drive(own).signals["vehicle_speed"].values[0] == 10.0
 
 
-def test_results_named_like_patterns(tmp_path):
+def test_results_named_like_patterns(weighbridge, tmp_path):
     frame = pl.DataFrame({"time_s": [0.0], "mass_kg": [1.0], "std_kg": [1.0]})
     frame.write_parquet(tmp_path / "ab.parquet")
-    other = tmp_path / "a?.parquet"
+    other, car = tmp_path / "a?.parquet", tmp_path / "car.toml"
     other.write_bytes((tmp_path / "ab.parquet").read_bytes())
-    refuse_results(inputs(), [Result("--track", other, "track")])
+    car.write_text("[vehicle]\nname = 'x'\n")
+    words = ("weigh", GOLDEN / "csv", "--vehicle", car, "--track", other)
+    assert not named(weighbridge(*words).err, "--track")
     pl.DataFrame({"time_s": [0.0]}).write_parquet(other)
-    with pytest.raises(ConfigError, match="track"):
-        refuse_results(inputs(), [Result("--track", other, "track")])
+    ran = weighbridge(*words)
+    assert ran.code == 2
+    assert named(ran.err, other.name, "--track")
 
 
 def test_the_command_reads_the_folder_named(weighbridge, tmp_path):

@@ -15,7 +15,6 @@ from tests.noted import error, named
 
 from weighbridge import ConfigError, DriveError, Vehicle, read_drive
 from weighbridge.io.quiet import quietly
-from weighbridge.signals.tomlfile import read_toml
 from weighbridge.vehicle.model import (
     Driveline,
     Mounting,
@@ -62,10 +61,10 @@ TOMLS = {
     "dots": ("a." * 100_000 + "b = 1", "a key of more than 100 parts"),
     "quoted dots": ('"a" . ' * 100_000 + "b = 1", "a key of more than 100 parts"),
     "inline dots": ("x = {" + "a." * 100_000 + "b = 1}", "a key of more than 100 parts"),
-    "blanks": ("[" + " " * 1_000_000 + "\n", "not valid TOML"),
-    "header": ("[" + "a" * 3_000_000 + "]\nb = 1", "is not known"),
-    "comments": ("# x\n" * 2_000_000, "longer than 4 MB"),
-    "key": ("a" * 3_000_000 + " = 1", "is not known"),
+    "blanks": (lambda: "[" + " " * 1_000_000 + "\n", "not valid TOML"),
+    "header": (lambda: "[" + "a" * 3_000_000 + "]\nb = 1", "is not known"),
+    "comments": (lambda: "# x\n" * 2_000_000, "longer than 4 MB"),
+    "key": (lambda: "a" * 3_000_000 + " = 1", "is not known"),
     "zero": ("tare_kg = 0", "car.toml 2 tare_kg 0.0"),
     "tiny": ("tare_kg = 1e-299", "car.toml tare_kg 1e-299 10 1e+06"),
 }
@@ -75,6 +74,8 @@ TOMLS = {
 def test_vehicle_files(refused, tmp_path, case):
     text, said = TOMLS[case]
     path = tmp_path / "car.toml"
+    # Texts of megabytes are made where they are written.
+    text = text() if callable(text) else text
     path.write_text(f"[vehicle]\n{text}\n")
     refused("weigh", GOLDEN / "csv", "--vehicle", path, said=said)
 
@@ -89,7 +90,9 @@ def test_what_is_known_of_a_drive(refused, tmp_path, text):
 def test_decorated_comments_and_long_lists_are_no_keys(tmp_path):
     path = tmp_path / "car.toml"
     path.write_text(f"# {'.' * 200}\nx = [{', '.join(['1.5'] * 500)}] # {'. ' * 300}\n")
-    assert len(read_toml(path).numbers("x")) == 500
+    # It is read whole: what is refused is its one key.
+    with error(ConfigError, "car.toml 2 x"):
+        Vehicle.load(path)
 
 
 @pytest.mark.parametrize(
@@ -168,7 +171,7 @@ def test_encodings_that_the_bytes_are_not(weighbridge, tmp_path, encoding):
 def test_a_header_of_ten_million_commas(refused, tmp_path):
     log = tmp_path / "x.csv"
     log.write_bytes(b"," * 10_000_000 + b"\n1,2\n")
-    refused("inspect", log, said="10000001 columns")
+    refused("inspect", log, said="10000001")
 
 
 def test_a_parquet_of_many_columns(tmp_path):

@@ -6,10 +6,7 @@ from pathlib import Path
 
 import polars as pl
 import pytest
-from tests.noted import error, named
-
-from weighbridge import ConfigError
-from weighbridge.cli.results import Result, asked_for, inputs, refuse_folder, refuse_results
+from tests.noted import named
 
 GOLDEN = Path(__file__).parent.parent / "golden"
 VEHICLE = "[vehicle]\nname = 'x'\n"
@@ -182,40 +179,54 @@ def test_two_results_in_one_file(weighbridge, drive, car, tmp_path):
     refused(weighbridge(*words, tmp_path / "z"), "--report --json")
 
 
-def test_earlier_results_of_the_same_kind_are_replaced(tmp_path):
-    track = pl.DataFrame({"time_s": [0.0], "mass_kg": [1.0], "std_kg": [1.0]})
-    kinds = {"r.html": "report", "r.json": "JSON file", "c.toml": "vehicle file", "d.mf4": "MF4"}
-    texts = (REPORT, '{"drive": "x"}\n', "# mine\n\n[driveline]\n", "MDF     4.10")
-    for (name, kind), text in zip(kinds.items(), texts, strict=True):
+@pytest.fixture
+def taken(weighbridge, drive, car):
+    """Return whether a command takes a place for what it writes; its name is among its words."""
+
+    def check(path, *words):
+        weigh = ("weigh", drive, "--vehicle", car)
+        ran = weighbridge(*(words if words[0] in ("calibrate", "convert") else (*weigh, *words)))
+        return not (ran.code == 2 and named(ran.err, path.name))
+
+    return check
+
+
+def test_earlier_results_of_the_same_kind_are_replaced(taken, drive, tmp_path):
+    texts = {
+        "r.html": (REPORT, ("--report",)),
+        "r.json": ('{"drive": "x"}\n', ("--json",)),
+        "c.toml": (
+            "# mine\n\n[driveline]\n",
+            ("calibrate", drive, "--mass", 1500, "--force", "-o"),
+        ),
+        "d.mf4": ("MDF     4.10", ("convert", drive, "--force")),
+    }
+    for name, (text, words) in texts.items():
         path = tmp_path / name
         for old in (text, ""):
             path.write_text(old)
-            refuse_results(inputs(), [Result("-o", path, kind)])
-        for other in {*texts, "notes"} - {text}:
+            assert taken(path, *words, path), name
+        for other in {t for t, _ in texts.values()} - {text} | {"notes"}:
             path.write_text(other)
-            with error(ConfigError, name, kind, "-o"):
-                refuse_results(inputs(), [Result("-o", path, kind)])
+            assert not taken(path, *words, path), (name, other)
+            assert path.read_text() == other
+    track = pl.DataFrame({"time_s": [0.0], "mass_kg": [1.0], "std_kg": [1.0]})
     for name in ("t.csv", "t.parquet"):
         path = tmp_path / name
         for frame, own in ((track, True), (track.drop("std_kg"), False)):
             frame.write_csv(path) if name == "t.csv" else frame.write_parquet(path)
-            results = asked_for(track=path, report=None, json=None)
-            if own:
-                refuse_results(inputs(), results)
-            else:
-                with error(ConfigError, name, "--track"):
-                    refuse_results(inputs(), results)
+            assert taken(path, "--track", path) is own
 
 
-def test_devices_and_new_files_are_free(drive, car, tmp_path):
+def test_devices_and_new_files_are_free(taken, drive, tmp_path):
     null = Path("/dev/null")
-    read = inputs([drive], car)
-    refuse_results(read, asked_for(track=None, report=null, json="/dev/null"))
-    refuse_results(read, asked_for(track=drive / "new.csv", report=tmp_path / "a", json="-"))
-    refuse_folder(read, tmp_path / "new")
-    refuse_folder(read, drive / "sub")
-    with error(ConfigError, "drive"):
-        refuse_folder(read, drive)
+    assert taken(null, "--report", null, "--json", null)
+    assert taken(drive / "new.csv", "--track", drive / "new.csv")
+    assert taken(tmp_path / "a", "--report", tmp_path / "a", "--json", "-")
+    assert taken(tmp_path / "new", "convert", drive, tmp_path / "new")
+    assert taken(drive / "sub", "convert", drive, drive / "sub")
+    assert any(p.stem == "imu" for p in (drive / "sub").iterdir())
+    assert not taken(drive, "convert", drive, drive)
 
 
 def test_results_that_would_be_tables(weighbridge, drive, car, tmp_path):
@@ -232,10 +243,9 @@ def test_results_that_would_be_tables(weighbridge, drive, car, tmp_path):
     refused(weighbridge("weigh", logs, "--vehicle", car, "--track", track), track)
 
 
-def test_times_beside_an_array_are_inputs(tmp_path):
+def test_times_beside_an_array_are_inputs(weighbridge, car, tmp_path):
     for name in ("value.npy", "t.npy"):
         (tmp_path / name).write_bytes(b"")
-    with pytest.raises(ConfigError, match="is an input"):
-        refuse_results(
-            inputs([tmp_path / "value.npy"]), [Result("--json", tmp_path / "t.npy", "JSON file")]
-        )
+    times = tmp_path / "t.npy"
+    refused(weighbridge("weigh", tmp_path / "value.npy", "--vehicle", car, "--json", times), times)
+    assert times.read_bytes() == b""

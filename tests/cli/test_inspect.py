@@ -1,34 +1,26 @@
 """``weighbridge inspect`` end to end."""
 
-import io
 import re
-from dataclasses import replace
+import shutil
 from pathlib import Path
 
 import numpy as np
 import polars as pl
 import pytest
-import typer
-from tests.noted import error, noted, says
-from typer.testing import CliRunner
+from tests.noted import named, says
 
-from weighbridge import DriveError
-from weighbridge.cli.inspect import inspect
+from weighbridge import Signal, inspect_drive, read_drive
+from weighbridge.io import write_drive
 
 GOLDEN = Path(__file__).resolve().parents[1] / "golden"
 
 
 @pytest.fixture
-def run():
-    app = typer.Typer()
-    app.command()(inspect)
-
+def run(weighbridge):
     def invoke(*words):
-        result = CliRunner().invoke(app, [str(w) for w in words])
-        if result.exception is not None and not isinstance(result.exception, SystemExit):
-            raise result.exception
-        assert result.exit_code == 0
-        return result.stdout
+        ran = weighbridge("inspect", *words)
+        assert (ran.code, ran.err) == (0, "")
+        return ran.out
 
     return invoke
 
@@ -79,9 +71,10 @@ def test_every_way_on_request(run):
     assert "lacks" not in short
 
 
-def test_what_cannot_be_read_is_one_error(run, tmp_path):
-    with error(DriveError, "nowhere"):
-        run(tmp_path / "nowhere")
+def test_what_cannot_be_read_is_one_error(weighbridge, tmp_path):
+    ran = weighbridge("inspect", tmp_path / "nowhere")
+    assert ran.code == 2
+    assert named(ran.err, "nowhere")
 
 
 def test_help_has_an_example(run):
@@ -97,25 +90,14 @@ def test_one_sample_has_no_rate(run, tmp_path):
     assert row.count("400") == 2
 
 
-def test_brackets_stay_in_tables_of_several_drives():
-    from rich.console import Console
-
-    from weighbridge import Drive, Status, Vehicle
-    from weighbridge.cli.weigh import method_table, result_table
-    from weighbridge.pipeline.weighing import without_mass
-
-    why = "state it under [torque] of the vehicle file"
-    car = Vehicle()
-    none = without_mass(Drive("run[a]", {}), car, "rls", noted(why))
-    assert none.status is Status.MISSING_SIGNALS
-    console = Console(width=160)
-    with console.capture() as shown:
-        console.print(result_table([none.row], [("logs[b]", noted(why))], car))
-        console.print(method_table((none,)))
-    text = shown.get()
-    assert text.count("under [torque] of") == 3
-    assert text.count("run[a]") == 2
-    assert "logs[b]" in text
+def test_brackets_stay_in_tables_of_several_drives(weighbridge, tmp_path):
+    for name in ("run[a]", "logs[b]"):
+        shutil.copytree(GOLDEN / "csv", tmp_path / name)
+    car = tmp_path / "car.toml"
+    car.write_text("[vehicle]\nname = 'x'\n")
+    words = ("weigh", tmp_path / "run[a]", tmp_path / "logs[b]", "--vehicle", car)
+    out = weighbridge(*words).out + weighbridge(*words, "--compare").out
+    assert out.count("run[a]") == out.count("logs[b]") == 2
 
 
 def test_the_next_command_stands_at_the_end(run, weighbridge, loaded, car):
@@ -125,38 +107,22 @@ def test_the_next_command_stands_at_the_end(run, weighbridge, loaded, car):
     assert last == f"next: weighbridge weigh {loaded.folder} --vehicle {car}"
 
 
-def test_a_narrow_terminal_shows_whole_numbers():
-    from rich.console import Console
-
-    from weighbridge import inspect_drive, read_drive
-    from weighbridge.cli.inspect import _signal_table
-
-    found = inspect_drive(read_drive(GOLDEN / "csv"))
-    for width in (60, 80, 140):
-        screen = Console(width=width, record=True, file=io.StringIO())
-        screen.print(_signal_table(found, width))
-        shown = screen.export_text()
-        assert "…" not in shown
-        assert ("251" in shown) == (width >= 80)
-        assert ("jitter ms" in shown) == (width == 140)
+def next_lines(weighbridge, drive, place, *words):
+    """Return the commands that inspecting a drive as the folder ``day`` ends with."""
+    write_drive(drive, place / "day")
+    out = weighbridge("inspect", "day", *words).out.strip().splitlines()
+    return [line for line in out if line.startswith(("next: ", "then: "))]
 
 
-def test_a_log_with_a_retarder_leads_to_a_truck_file():
-    from weighbridge import Signal, inspect_drive, read_drive
-    from weighbridge.cli.inspect import _Given, _next
-
-    time = np.arange(3.0)
-    drive = read_drive(GOLDEN / "csv")
-    found = inspect_drive(drive)
-    given = _Given(None, None, Path("map.toml"), None, False)
-    (only,) = _next(replace(found, problems=()), Path("day"), 1, given)
-    assert only == "next: weighbridge calibrate day --mass KG -o vehicle.toml --mapping map.toml"
-    truck = drive.with_signals(Signal("retarder_torque", time, -0.1 * time))
-    found = replace(found, drive=truck, problems=())
-    first, then = _next(found, Path("day"), 1, given)
-    assert first.startswith(
-        "next: weighbridge vehicle new --class truck --mapping map.toml -o base"
-    )
+def test_a_log_with_a_retarder_leads_to_a_truck_file(weighbridge, loaded, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    drive = read_drive(loaded.folder)
+    (only,) = next_lines(weighbridge, drive, tmp_path)
+    assert only == "next: weighbridge calibrate day --mass KG -o vehicle.toml"
+    time = drive.speed.time
+    truck = drive.with_signals(Signal("retarder_torque", time, -0.1 * (time % 7.0)))
+    first, then = next_lines(weighbridge, truck, tmp_path)
+    assert first.startswith("next: weighbridge vehicle new --class truck -o base")
     assert then.startswith("then: weighbridge calibrate day --mass KG -o vehicle.toml")
     assert then.endswith("--vehicle base.toml")
 
@@ -164,8 +130,6 @@ def test_a_log_with_a_retarder_leads_to_a_truck_file():
 @pytest.fixture
 def percent_drive(loaded):
     """A drive of a truck that tells its torque in percent, and nothing else of it."""
-    from weighbridge import Signal, read_drive
-
     drive = read_drive(loaded.folder)
     load = drive.signals["engine_load"]
     drive = drive.without("engine_load", "mass_air_flow", "engine_torque")
@@ -175,75 +139,58 @@ def percent_drive(loaded):
     )
 
 
-def next_lines(drive, vehicle=None):
-    from weighbridge import inspect_drive
-    from weighbridge.cli.inspect import _Given, _next
-
-    found = replace(inspect_drive(drive, vehicle), problems=())
-    path = Path("truck.toml") if vehicle is not None else None
-    return found, _next(found, Path("day"), 1, _Given(vehicle, path, None, None, False))
-
-
-def test_percent_torque_without_its_reference_is_what_is_nearest(percent_drive):
-    from weighbridge.vehicle.known import Known, describe
-
-    found, (first, then) = next_lines(percent_drive)
-    assert found.ways[0].torque == "percent"
-    assert found.ways[0].needs == ("reference_torque (or reference_torque_nm in the vehicle file)",)
+def test_percent_torque_without_its_reference_is_what_is_nearest(
+    weighbridge, percent_drive, tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    way = inspect_drive(percent_drive).ways[0]
+    assert way.torque == "percent"
+    assert way.needs == ("reference_torque (or reference_torque_nm in the vehicle file)",)
+    first, then = next_lines(weighbridge, percent_drive, tmp_path)
     assert first.startswith(
         "next: weighbridge vehicle new --class truck --torque percent --reference-torque NM "
         "-o base.toml"
     )
     assert then == "then: weighbridge inspect day --vehicle base.toml"
-    truck = describe(Known(kind="truck", torque="percent")).vehicle
-    _, (only,) = next_lines(percent_drive, truck)
-    assert "reference_torque_nm under [torque] of truck.toml" in only
-    truck = describe(Known(kind="truck", torque="percent", reference_torque=1800.0)).vehicle
-    found, lines = next_lines(percent_drive, truck)
-    assert found.ways[0].chosen
+    new = ("vehicle", "new", "--class", "truck", "--torque", "percent", "-o", "truck.toml")
+    assert weighbridge(*new).code == 0
+    (only,) = next_lines(weighbridge, percent_drive, tmp_path, "--vehicle", "truck.toml")
+    assert "reference_torque_nm" in only
+    assert "truck.toml" in only
+    assert weighbridge(*new, "--reference-torque", 1800, "--force").code == 0
+    lines = next_lines(weighbridge, percent_drive, tmp_path, "--vehicle", "truck.toml")
     assert lines[0] == "next: weighbridge weigh day --vehicle truck.toml"
 
 
-def test_the_torque_in_percent_goes_into_the_next_command(percent_drive):
-    from weighbridge import Signal
-    from weighbridge.vehicle.known import Known, describe
-
+def test_the_torque_in_percent_goes_into_the_next_command(
+    weighbridge, percent_drive, tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
     reference = Signal("reference_torque", np.array([percent_drive.start]), np.array([1800.0]))
     drive = percent_drive.with_signals(reference)
-    _, (first, then) = next_lines(drive)
+    first, then = next_lines(weighbridge, drive, tmp_path)
     assert "vehicle new --class truck --torque percent -o base.toml" in first
     assert then.startswith("then: weighbridge calibrate day")
     # A file that weighs by a torque that the drive lacks leads to no weighing.
-    truck = describe(Known(kind="truck", torque="measured")).vehicle
-    _, (only,) = next_lines(drive, truck)
-    assert only == (
-        "next: the vehicle file weighs by torque in N m, and the drive holds torque in percent; "
-        "make a vehicle file of it: calibrate --torque percent, or vehicle new --torque percent"
-    )
+    new = ("vehicle", "new", "--class", "truck", "--torque", "measured", "-o", "truck.toml")
+    assert weighbridge(*new).code == 0
+    (only,) = next_lines(weighbridge, drive, tmp_path, "--vehicle", "truck.toml")
+    assert "weighbridge weigh" not in only
+    assert "--torque percent" in only
 
 
-def test_warnings_of_several_drives_are_a_few_lines():
-    from weighbridge import Drive, Problem
-    from weighbridge.cli.weigh import result_table, warning_lines
-    from weighbridge.pipeline.weighing import without_mass
-    from weighbridge.vehicle.known import Known, describe
-
-    def day(k, *warnings):
-        parted = f"day holds 2 drives, parted by pauses; this is drive {k}"
-        name = f"day part {k} of 2"
-        told = (Problem("file.part", parted), *map(noted, ("heights", *warnings)))
-        return without_mass(Drive(name, {}), truck, "joint", noted("why"), told).row
-
-    truck = describe(Known(kind="truck", torque="percent")).vehicle
-    drives = [day(1), day(2, "a", "b", "c", "d", "e")]
-    assert warning_lines(drives) == [
-        "every drive: heights",
-        *(f"day part 2 of 2: {x}" for x in "abc"),
-        "day part 2 of 2: 2 more, see --json",
-    ]
-    assert warning_lines([]) == []
-    assert "never calibrated" in result_table(drives, [], truck).title
-    assert result_table([], [("day", noted("why"))], truck).title is None
+def test_warnings_of_several_drives_are_a_few_lines(weighbridge, percent_drive, tmp_path):
+    car = tmp_path / "car.toml"
+    words = ("--class", "truck", "--torque", "percent", "--reference-torque", "1800")
+    assert weighbridge("vehicle", "new", *words, "-o", car).code == 0
+    for k in (1, 2):
+        write_drive(percent_drive.between(0.0, 100.0 + 20.0 * k), tmp_path / f"day{k}")
+    out = weighbridge("weigh", tmp_path / "day1", tmp_path / "day2", "--vehicle", car).out
+    notes = re.findall(r"note: (every drive|day\d): (.*)", out)
+    shared = [text for of, text in notes if of == "every drive"]
+    assert shared
+    assert all(out.count(text) == 1 for text in shared)
+    assert all(0 < sum(of == name for of, _ in notes) <= 4 for name in ("day1", "day2"))
 
 
 def test_the_way_by_wheel_torque_is_named_where_the_driven_axles_are_all_it_lacks(

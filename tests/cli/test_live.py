@@ -11,7 +11,6 @@ from tests.noted import named
 
 import weighbridge as wb
 from weighbridge.io import write_drive
-from weighbridge.live.ticket import calibrated_by_ticket
 
 
 def a_minute_later(table):
@@ -127,12 +126,6 @@ def test_a_ticket_calibrates(weighbridge, loaded, brief, car, tmp_path):
     assert "the vehicle file before says " in ran.err
     assert "written" in ran.err
     assert wb.Vehicle.load(out).provenance.masses == pytest.approx((1.2 * loaded.mass,), abs=1.0)
-
-
-def test_a_ticket_of_a_long_drive_makes_a_file(known, car):
-    made = calibrated_by_ticket(wb.read_drive(known.folder), known.mass, wb.Vehicle.load(car))
-    assert made.vehicle is not None
-    assert made.reported.startswith("it leaves ± ")
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="there are no named pipes")

@@ -15,16 +15,16 @@ from tests.noted import named
 
 from weighbridge.cli.main import app
 from weighbridge.cli.progress import Bar, compiling, time_text
-from weighbridge.cli.verbosity import _leaves
 
 COLOUR = re.compile(r"\x1b\[(?:\d+;)*(?:3[0-7]|38;|9[0-7])")
 SMALL = ("--vehicles", "1", "--days", "1", "--drives", "3", "--minutes", "2", "--workers", "1")
 TIME_LEFT = re.compile(r"\d+ s left")
 
 
-def leaves():
-    root = typer.main.get_command(app)
-    return list(_leaves(root.commands.values()))
+def leaves(command=None):
+    command = typer.main.get_command(app) if command is None else command
+    below = getattr(command, "commands", {}).values()
+    return [leaf for one in below for leaf in leaves(one)] if below else [command]
 
 
 def test_every_command_takes_them():

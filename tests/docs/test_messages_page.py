@@ -2,10 +2,8 @@
 
 import ast
 import re
-from functools import cache
 from pathlib import Path
 
-import pytest
 from website.messages import messages_page
 
 import weighbridge
@@ -40,22 +38,14 @@ def first_cells():
     return [row for row in rows if row not in HEADS and not row.startswith("---")]
 
 
-@cache
-def texts():
-    """Return the texts of the whole program."""
-    return "\n".join(text for path in sorted(SOURCE.rglob("*.py")) for text in strings(path))
-
-
 ID = re.compile(r"`([a-z]+\.[a-z0-9_]+)`")
 
 
-@pytest.mark.parametrize("message", first_cells())
-def test_a_message_of_the_page_is_one_of_the_program(message):
-    """By its ids; errors of files and arguments have none, and stand by their words."""
-    ids = ID.findall(message)
-    assert [id for id in ids if id not in catalogue()] == []
-    for piece in message.split("…") if not ids else ():
-        assert piece.strip() in texts(), piece
+def test_a_message_of_the_page_is_one_of_the_program():
+    """By its ids; errors of files and arguments have none."""
+    named = {id for message in first_cells() for id in ID.findall(message)}
+    assert len(named) > 50
+    assert named <= set(catalogue())
 
 
 def test_every_status_has_a_heading():

@@ -1,10 +1,14 @@
 """Rows of results as the engine writes them, with the values that a test is about."""
 
+import tempfile
 from datetime import UTC, datetime
+from pathlib import Path
 
 import polars as pl
 
-from weighbridge.fleet.schema import DRIVES, SEGMENTS
+from weighbridge.fleet import FleetReport, report
+from weighbridge.fleet.schema import DRIVES, PART, SEGMENTS
+from weighbridge.fleet.store import Results, write_part
 
 
 def drive(key, vehicle="truck1", *, start="2026-05-04T06:00:00+00:00", mass=None, std=None, **more):
@@ -62,3 +66,21 @@ def frames(drives, segments=()):
         pl.DataFrame(list(drives), schema={n: c.type for n, c in DRIVES.items()}, orient="row"),
         pl.DataFrame(list(segments), schema={n: c.type for n, c in SEGMENTS.items()}, orient="row"),
     )
+
+
+def reported(drives, segments=(), **how) -> FleetReport:
+    """Return the report on a folder of results with these rows."""
+    inner = [f.name for f in PART["segments"].inner.fields]
+    with tempfile.TemporaryDirectory() as home:
+        folder = Results.begun(Path(home) / "results").folder
+        for row in drives:
+            own = [{n: s[n] for n in inner} for s in segments if s["key"] == row["key"]]
+            write_part(folder, row["key"], [row | {"segments": own}])
+        return report(folder, **how)
+
+
+def write_learnt(folder, rows):
+    """Write what a run learnt of vehicles into its results."""
+    columns = report(folder).learnt.drop("drifts", "verdict").schema
+    frame = pl.DataFrame(list(rows), schema=columns, orient="row")
+    frame.write_parquet(Path(folder) / "learnt.parquet")

@@ -7,16 +7,7 @@ import numpy as np
 import pytest
 
 import weighbridge as wb
-from weighbridge.fleet import read_drives, read_segments, speed_mass
-from weighbridge.fleet.facts import weighing_row
-from weighbridge.fleet.figures import per_vehicle
-from weighbridge.fleet.inputs import recordings
-from weighbridge.fleet.job import Job, weigh_job
-from weighbridge.fleet.legs import legs
-from weighbridge.fleet.protocol import known_masses
-from weighbridge.fleet.store import Results
-from weighbridge.fleet.tickets import Ticket, ticketed
-from weighbridge.fleet.vehicles import Vehicles
+from weighbridge.fleet import read_drives, read_segments, report, speed_mass
 from weighbridge.io import write_drive
 from weighbridge.simulation import make_scenario, simulate_car
 
@@ -35,7 +26,7 @@ def loading():
 
 
 @pytest.fixture(scope="module")
-def frozen(tmp_path_factory, loading, short_car):
+def frozen(tmp_path_factory, loading, short_car, scheduler):
     """Results of the drive with its torque held from an instant on, and what `weigh` says."""
 
     @cache
@@ -50,23 +41,21 @@ def frozen(tmp_path_factory, loading, short_car):
         cars.mkdir()
         replace(short_car, tare=1400.0, gross=2000.0).save(cars / "car.toml")
         write_drive(drive, drives / "car" / "trip", "parquet")
-        results, shelf = Results.begun(home / "results"), Vehicles(cars)
-        for found in recordings([str(drives)]):
-            assigned = shelf.of(found.paths, found.vehicle, found.kind)
-            weigh_job(Job(recording=found, assigned=assigned, results=str(results.folder)))
+        results = home / "results"
+        wb.fleet.weigh_drives(drives, cars, results, scheduler=scheduler)
         told = wb.weigh(drives / "car" / "trip", cars / "car.toml")
         assert told.mass > 0.0
         assert not told.load_changed
-        return read_drives(results.folder), read_segments(results.folder).collect(), told
+        return results, told
 
     return made
 
 
 @pytest.mark.parametrize(("instant", "stop"), [(300.0, 0), (450.0, 1)])
 def test_from_the_stop_after_the_freeze_on_there_is_no_mass(frozen, loading, instant, stop):
-    lazy, segments, told = frozen(instant)
-    drives = lazy.collect()
-    first, rest = legs(drives, segments).to_dicts()
+    results, told = frozen(instant)
+    segments = read_segments(results).collect()
+    first, rest = report(results).legs.sort("leg").to_dicts()
     off = loading[1][stop] - told.drive.start
     assert first["duration_s"] == pytest.approx(off, abs=1.0)
     assert (first["mass_kg"], first["std_kg"]) == (told.mass, told.std)
@@ -74,29 +63,27 @@ def test_from_the_stop_after_the_freeze_on_there_is_no_mass(frozen, loading, ins
     for name in ("mass_kg", "payload_kg", "overload", "level", "trailer", "empty", "tkm"):
         assert rest[name] is None, name
     assert (rest["prevents"], rest["reason_id"]) == ("mass", "fleet.not_driven_out")
-    (row,) = drives.to_dicts()
+    (row,) = read_drives(results).collect().to_dicts()
     assert first["distance_km"] + rest["distance_km"] == pytest.approx(row["distance_km"])
     assert rest["distance_km"] > 0.3
     assert row["unweighed_s"] == pytest.approx(rest["duration_s"])
     assert segments["weighed_s"].to_list() == pytest.approx([row["used_s"], 0.0], abs=1.0)
-    # A row of the store keeps ids and texts of the problems.
-    kept = tuple(wb.Problem(p.id, p.text) for p in told.row.problems)
-    assert repr(weighing_row(row, segments.to_dicts())) == repr(replace(told.row, problems=kept))
 
 
-def test_what_was_not_weighed_is_in_no_sum_and_is_known_by_no_ticket(frozen):
-    lazy, segments, told = frozen(300.0)
-    drives = lazy.collect()
-    rows = legs(drives, segments)
-    (vehicle,) = per_vehicle(rows, rows.clear().select("vehicle_id")).to_dicts()
+def test_what_was_not_weighed_is_in_no_sum_and_is_known_by_no_ticket(frozen, tmp_path):
+    results, told = frozen(300.0)
+    found = report(results)
+    rows = found.legs.sort("leg")
+    (vehicle,) = found.vehicles.to_dicts()
     weighed, rest = rows["distance_km"]
     assert (vehicle["drives"], vehicle["legs"]) == (1, 2)
     assert vehicle["known_km"] == vehicle["payload_km"] == pytest.approx(weighed)
     assert vehicle["tkm"] == pytest.approx(1e-3 * (told.mass - 1400.0) * weighed)
+    drives, segments = read_drives(results).collect(), read_segments(results).collect()
     table = speed_mass(drives, segments).drop_nulls("speed_kmh")
     assert table.filter(table["mass_t"].is_null())["distance_km"].sum() == pytest.approx(rest)
-    end = rows["end"][1]
-    ticket = Ticket("car", end, 1786.0)
-    assert ticketed([ticket], lazy).is_empty()
-    (known,) = known_masses(rows, drives, [ticket]).to_dicts()
-    assert (known["known_kg"], known["error"]) == (1786.0, None)
+    tickets = tmp_path / "tickets.csv"
+    tickets.write_text(f"vehicle,time,mass_kg\ncar,{rows['end'][1].isoformat()},1786\n")
+    late = report(results, tickets=tickets)
+    assert (late.totals["known_legs"], late.outside.height) == (0, 0)
+    assert late.verdicts["vehicle_id"].to_list() == ["car"]

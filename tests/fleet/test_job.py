@@ -7,13 +7,12 @@ from pathlib import Path
 import pytest
 
 import weighbridge as wb
-from tests.fleet.fleets import compared, real_fleet, tiny_drive, tiny_fleet
+from tests.fleet.fleets import compared, real_fleet, tiny_fleet
 from tests.noted import error, named, noted
 from weighbridge import ConfigError
 from weighbridge.fleet.facts import weighing_row
 from weighbridge.fleet.inputs import recordings
 from weighbridge.fleet.job import THERE, Job, fail_job, weigh_job
-from weighbridge.fleet.keys import content_digest
 from weighbridge.fleet.store import Results, part_path, read_parts
 from weighbridge.fleet.vehicles import Vehicles
 
@@ -178,9 +177,12 @@ def test_a_begin_that_the_table_of_drives_gives(tmp_path):
 
 
 def test_the_truth_of_a_simulation_is_no_content(tmp_path):
-    one = tiny_drive(tmp_path / "one", 1)
-    before = content_digest([one])
-    (one / "truth.csv").write_text("time_s,mass_kg\n0,1000\n")
-    assert content_digest([one]) == before
-    lone = one / "obd.csv"
-    assert content_digest([lone]) != before
+    drives, cars = tiny_fleet(tmp_path, 1)
+    (job,) = jobs(tmp_path, drives, cars)
+    key = weigh_job(job).key
+    place = Path(job.recording.paths[0])
+    (place / "truth.csv").write_text("time_s,mass_kg\n0,1000\n")
+    (job,) = jobs(tmp_path, drives, cars)
+    assert weigh_job(job)[:2] == (key, THERE)
+    lone = job.recording._replace(paths=(str(place / "obd.csv"),))
+    assert weigh_job(replace(job, recording=lone)).key != key

@@ -146,6 +146,7 @@ def test_the_ticket_of_a_drive_in_which_the_load_changed_is_of_no_neighbour():
     at = NOON + timedelta(minutes=55)
     assert matched([("van", at, 3000.0)], *rows) == {}
     assert matched([("van", at, 3000.0)], rows[1]) == {"b": 3000.0}
+    assert matched([("van", at, 3000.0)], rows[1] | {"unweighed_s": 300.0}) == {}
 
 
 @pytest.mark.parametrize(

@@ -2,12 +2,10 @@
 
 from datetime import datetime, timedelta
 
-import polars as pl
 import pytest
 
 import weighbridge as wb
-from tests.fleet.made_rows import drive, segment
-from weighbridge.fleet.learnt import COLUMNS, LEARNT
+from tests.fleet.made_rows import drive, segment, write_learnt
 from weighbridge.fleet.schema import PART
 from weighbridge.fleet.store import Results, write_part
 
@@ -34,11 +32,11 @@ def page(tmp_path_factory):
                     warnings=["the clock of a signal jumps " + "x" * 150])  # fmt: skip
         told = segment(key, 0, 0.0, 1200.0, mass, 500.0, period_km=[5.0] * 4)
         write_part(folder, key, [row | {"segments": [{n: told[n] for n in inner}]}])
-    learnt = dict.fromkeys(COLUMNS) | {
+    learnt = {
         "vehicle_id": "truck2", "drives": 4, "weighed": 4, "error_pct": 12.34, "error_std_pct": 4.0,
         "contradicted": True, "refined": "truck2.toml", "told": "4 drives contradict the file",
     }  # fmt: skip
-    pl.DataFrame([learnt], schema=COLUMNS, orient="row").write_parquet(folder / LEARNT)
+    write_learnt(folder, [learnt])
     path = home / "fleet.html"
     wb.fleet.write_page(wb.fleet.report(folder), path)
     return path

@@ -11,9 +11,8 @@ import pytest
 
 from tests.noted import error
 from weighbridge import ConfigError
-from weighbridge.fleet import read_drives, read_segments
+from weighbridge.fleet import read_drives, read_segments, report
 from weighbridge.fleet import store as store_module
-from weighbridge.fleet.reading import collected
 from weighbridge.fleet.schema import FAILED, PART, UNREAD, WEIGHED
 from weighbridge.fleet.store import Results, part_path, read_parts, write_part
 
@@ -175,9 +174,8 @@ def test_a_damaged_table_is_told_and_its_date_is_weighed_again(results, table, h
     results.gather()
     hurt = results.table_files(table)[0]
     _damage(hurt, how)
-    read = {"drives": read_drives, "segments": read_segments}[table]
     with error(ConfigError, "day=2026-05-01") as told:
-        collected(read(results.folder), results.folder)
+        report(results.folder)
     assert str(hurt) in str(told.value)
     removed = re.findall(r"\S+/day=\S+?(?=,| and )", str(told.value).partition("remove")[2])
     assert [Path(p).parent.name for p in removed] == ["drives", "segments"]

@@ -10,9 +10,8 @@ import polars as pl
 import pytest
 
 from tests.fleet.made_rows import drive, segment
-from weighbridge.fleet import read_drives, read_segments
+from weighbridge.fleet import report
 from weighbridge.fleet.kept import keep_legs
-from weighbridge.fleet.legs import legs
 from weighbridge.fleet.schema import DRIVES, LEGS, PART, SEGMENTS
 from weighbridge.fleet.store import Results, write_part
 
@@ -156,7 +155,7 @@ def test_the_legs_are_those_of_the_drives_and_only_days_that_changed_are_made_an
     by = ["key", "part", "leg"]
 
     def same():
-        told = legs(read_drives(results.folder).collect(), read_segments(results.folder).collect())
+        told = report(results.folder).legs
         files = results.table_files("legs")
         found = pl.concat(pl.read_parquet(f, hive_partitioning=False) for f in files)
         assert found.sort(by).equals(told.sort(by))

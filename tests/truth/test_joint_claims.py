@@ -9,7 +9,7 @@ import pytest
 import weighbridge as wb
 from weighbridge import Signal, Status, Vehicle
 from weighbridge.balance import force_balance
-from weighbridge.estimators import joint
+from weighbridge.estimators import ESTIMATORS
 from weighbridge.estimators.joint import batch
 from weighbridge.navigation.select import find_motion
 from weighbridge.simulation import (
@@ -155,7 +155,7 @@ def test_noise_of_a_measured_torque_does_not_move_the_mean():
                 for noise in (0.01, 0.04)
             )
             a, b = (
-                joint.estimate(force_balance(d, electric, motion), electric).mass
+                ESTIMATORS["joint"].track(force_balance(d, electric, motion), electric).mass
                 for d in (little, much)
             )
             moved.append(b / a - 1.0)

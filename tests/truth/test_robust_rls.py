@@ -170,3 +170,25 @@ def test_batch_equals_sample_by_sample_to_the_last_bit():
         assert state.information == information[k]
         assert np.array_equal(told, [m[k] for m in means], equal_nan=True)
     assert state == last
+
+
+def test_hubers_weight_stays_out_of_the_covariance_as_in_eq_20():
+    begin = robust_rls.RobustRlsState(
+        10_000.0, 0.0, 50.0, 0.0, 0.0, 300.0**2, 100, 0, 0.0, 0.0, 0.0, 0.0
+    )
+    found = []
+    for counts in (True, False):
+        how = params(
+            weight_information=counts,
+            forgetting=0.99,
+            threshold=1.345,
+        )
+        found.append(robust_rls.fold(begin, 0.8, 14_000.0, how))
+    (counted, weight), (printed, same) = found
+    assert weight == same
+    assert 0.05 < weight < 0.2
+    assert counted.information == pytest.approx(0.99 * 50.0 + weight * 0.64)
+    assert printed.information == pytest.approx(0.99 * 50.0 + 0.64)
+    # Eq. 20: gain of the plain filter, times the weight.
+    gain = 0.8 / 50.0 / (0.99 + 0.64 / 50.0)
+    assert printed.mass == pytest.approx(10_000.0 + gain * weight * 6000.0)

@@ -7,7 +7,7 @@ import pytest
 
 from weighbridge import Vehicle
 from weighbridge.constants import GRAVITY
-from weighbridge.estimators import ESTIMATORS, ritter, unmeasured_grade
+from weighbridge.estimators import ESTIMATORS, unmeasured_grade
 from weighbridge.kernels import multiple_forgetting
 from weighbridge.papers.jensen2022_drives import without_weather
 from weighbridge.pipeline.weighing import torque_balance
@@ -175,7 +175,7 @@ def test_the_grade_takes_what_its_forgetting_leaves_it():
 
 def test_the_batch_is_one_least_squares_of_mass_and_every_grade(truck):
     balance, car = truck
-    settings = ritter.RitterSettings()
+    settings = ESTIMATORS["ritter-batch"].settings()
     rows = unmeasured_grade.settled_rows(balance, car, settings)
     taken = rows.taken[:400]
     reason = balance.table.reason.copy()
@@ -188,4 +188,6 @@ def test_the_batch_is_one_least_squares_of_mass_and_every_grade(truck):
     changes = np.column_stack([np.zeros(n - 1), np.diff(np.eye(n), axis=0) / walk[:, None]])
     wanted = np.concatenate([accel / settings.accel_noise, np.zeros(n - 1)])
     solved = np.linalg.lstsq(np.vstack([errors, changes]), wanted, rcond=None)[0]
-    assert ritter.estimate(short, car).mass == pytest.approx(1e4 / solved[0], rel=1e-6)
+    assert ESTIMATORS["ritter-batch"].track(short, car).mass == pytest.approx(
+        1e4 / solved[0], rel=1e-6
+    )

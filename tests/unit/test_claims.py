@@ -14,7 +14,6 @@ from weighbridge.estimators.settings import changed, differences, parsed
 from weighbridge.papers import (
     PAPERS,
     du2025,
-    du2025_bus,
     galvao,
     galvao_figures,
     items_of,
@@ -217,8 +216,8 @@ def test_a_page_says_a_reason_once():
 
 def fresh_du2025():
     seeds = range(du2025.SEED, du2025.SEED + du2025.DRIVES)
-    buses = [du2025_bus.simulate(3000.0, seed, as_paper=True) for seed in seeds]
-    drives = [du2025.judge("half-load", bus, du2025_bus.known_bus()) for bus in buses]
+    buses = [du2025.simulate(3000.0, seed, as_paper=True) for seed in seeds]
+    drives = [du2025.judge("half-load", bus, du2025.known_bus()) for bus in buses]
     return du2025.our_rmse(drives, "ours")
 
 

@@ -11,11 +11,7 @@ from tests.noted import has, says
 
 import weighbridge as wb
 from weighbridge import Drive, Signal
-from weighbridge.checks.smoothed_imu import check_smoothed
-from weighbridge.navigation import clock_lag
-from weighbridge.navigation.clock_drift import correct_clocks
-from weighbridge.navigation.clock_lag import Integrated
-from weighbridge.navigation.identify import gain
+from weighbridge.checks import correct_drive
 from weighbridge.signals import QUANTITIES
 from weighbridge.simulation import (
     MIDSIZE,
@@ -78,19 +74,20 @@ def one_after_another(routes):
 
 
 def test_sound_clocks_of_a_day_are_left_to_the_last_bit(day):
-    mended = correct_clocks(day)
-    assert mended.problems == day.problems
-    assert all(mended.signals[name].time is s.time for name, s in day.signals.items())
+    mended = correct_drive(day)
+    assert not any(p.id == "clock.moved" for p in mended.problems)
+    for name in ("accel_x", "vehicle_speed", "latitude"):
+        assert_array_equal(mended.signals[name].time, day.signals[name].time)
 
 
 @pytest.mark.parametrize("ppm", [50.0, -50.0])
 def test_a_sensor_that_drifts_by_seconds_in_a_day_is_brought_back(day, ppm):
     """50 ppm are 1.4 s in eight hours, and no more than 0.02 s from one piece to the next."""
-    mended = correct_clocks(retimed(day, "imu", lambda t: t * (1.0 + 1e-6 * ppm)))
-    told = mended.problems[-1]
+    mended = correct_drive(retimed(day, "imu", lambda t: t * (1.0 + 1e-6 * ppm)))
+    (told,) = (p for p in mended.problems if p.id == "clock.moved")
     assert has([told], "clock.moved", table="obd and gnss", other="imu")
     assert says(told.text, "clock_drifts", slope=-ppm)
-    assert mended.signals["vehicle_speed"].time is day.signals["vehicle_speed"].time
+    assert_array_equal(mended.signals["vehicle_speed"].time, day.signals["vehicle_speed"].time)
     before, after = day.signals["accel_x"].time, mended.signals["accel_x"].time
     assert_allclose(after, before, rtol=0.0, atol=0.1)
 
@@ -106,34 +103,20 @@ def test_a_coarse_speed_on_a_motorway_is_no_clock_that_jumps():
     made = Scenario(name="motorway", car=MIDSIZE, route=highway_route(9453, length=30e3), seed=9453)
     drive = simulate_car(replace(made, duration=1800.0, sensors=Sensors(imu_rate=20.0))).drive
     coarse = in_steps(drive, 5.0 / 3.6)
-    assert correct_clocks(coarse).problems == coarse.problems
+    assert correct_drive(coarse).problems == coarse.problems
 
 
 def test_a_step_of_the_clock_of_a_coarse_speed_is_found(short):
     late = retimed(in_steps(short, 5.0 / 3.6), "obd", lambda t: t + 2.0 * (t > 1500.0))
-    told = correct_clocks(late).problems[-1]
+    told = correct_drive(late).problems[-1]
     assert has([told], "clock.moved", table="obd", most=pytest.approx(2.0, abs=0.2))
     assert says(told.text, "clock_jumps")
 
 
-def test_a_day_is_looked_at_in_parts_and_found_as_in_one(short, monkeypatch):
-    accel = [short.signals[f"accel_{a}"] for a in "xyz"]
-    time = np.cumsum(np.random.default_rng(1).uniform(0.0, 40.0, 3001))
-    whole, minutes = Integrated.of(accel), gain._starts(time)
-    monkeypatch.setattr(clock_lag, "SAMPLES_AT_ONCE", 1001)
-    monkeypatch.setattr(gain, "SAMPLES_AT_ONCE", 7)
-    in_parts = Integrated.of(accel)
-    for one, other in zip(whole.integrals, in_parts.integrals, strict=True):
-        assert_array_equal(one, other)
-    assert_array_equal(minutes, gain._starts(time))
-    minute = (time - time[0]) // 60.0
-    assert_array_equal(minutes, np.searchsorted(minute, np.unique(minute)))
-
-
-def test_the_memory_of_a_day_is_that_of_its_samples():
-    """Eleven hours at 200 Hz: neither the clocks nor the shaking need a column's room again."""
+def memory(count):
+    """Bytes that the checks take at most, of a sensor at 200 Hz [B]."""
     rng = np.random.default_rng(2)
-    time = 0.005 * np.arange(8_000_000)
+    time = 0.005 * np.arange(count)
     shaken = [Signal(f"accel_{a}", time, rng.standard_normal(time.size)) for a in "xyz"]
     slow = np.arange(0.0, time[-1], 1.0)
     speed = Signal("vehicle_speed", slow, 15.0 + 5.0 * np.sin(0.1 * slow))
@@ -141,15 +124,18 @@ def test_the_memory_of_a_day_is_that_of_its_samples():
     assert [s.period for s in shaken] == [pytest.approx(0.005)] * 3
     tracemalloc.start()
     try:
-        force = Integrated.of(shaken)
-        assert tracemalloc.get_traced_memory()[1] < 2.0 * time.nbytes
-        assert sum(x.nbytes for x in force.integrals) < time.nbytes
-        del force
-        tracemalloc.reset_peak()
-        assert list(check_smoothed(drive, None)) == []
-        assert tracemalloc.get_traced_memory()[1] < 1.5 * time.nbytes
+        assert not any(p.id.startswith("clock.") for p in correct_drive(drive).problems)
+        return tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()
+
+
+def test_the_memory_of_a_day_is_that_of_its_samples():
+    """Of a column of an hour more, clocks and shaking need no more than it has itself."""
+    # What is loaded and compiled on the way is no part of it.
+    memory(1000)
+    first, hour = 2_500_000, 720_000
+    assert memory(first + hour) - memory(first) < 2.0 * 8 * hour
 
 
 @pytest.mark.slow

@@ -1,6 +1,6 @@
 """Files that read alike, and what columns of one log tell of each other."""
 
-from dataclasses import replace
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -9,8 +9,6 @@ import pytest
 
 import weighbridge as wb
 from weighbridge.io.draft import draft
-from weighbridge.io.draft_alike import merged
-from weighbridge.io.mapping_text import mapping_text
 
 TIME = np.arange(0.0, 20.0, 0.1)
 
@@ -29,15 +27,20 @@ def days(tmp_path):
     ]
 
 
-def test_days_of_one_logger_get_one_mapping_that_fits_other_days(days, tmp_path):
-    drafts = [draft(path) for path in days]
-    # Alone the slow day would be taken for m/s.
-    assert drafts[0].known[0].unit == "mps"
-    one = merged(drafts)
-    assert one.files == 2
-    assert (one.known[0].unit, one.known[0].high, one.known[0].count) == ("kmh", 90.0, 400)
+def mapped(weighbridge, output, *paths):
+    """Return the mapping that the command drafts of some files."""
+    assert weighbridge("map", *paths, "-o", output, "--force").code == 0
+    return tomllib.loads(output.read_text(encoding="utf-8"))
+
+
+def test_days_of_one_logger_get_one_mapping_that_fits_other_days(weighbridge, days, tmp_path):
     mapping = tmp_path / "map.toml"
-    mapping.write_text(mapping_text([one]), encoding="utf-8")
+    # Alone the slow day would be taken for m/s.
+    alone = mapped(weighbridge, mapping, days[0])
+    assert alone["signals"]["vehicle_speed"]["unit"] == "mps"
+    one = mapped(weighbridge, mapping, *days)
+    assert "tables" not in one
+    assert one["signals"]["vehicle_speed"]["unit"] == "kmh"
     for path, top in zip(days, (20.0, 90.0), strict=True):
         read = wb.read_drive(path, mapping)
         assert read.signals["vehicle_speed"].values.max() == pytest.approx(top / 3.6)
@@ -45,12 +48,9 @@ def test_days_of_one_logger_get_one_mapping_that_fits_other_days(days, tmp_path)
     assert wb.read_drive(third, mapping).signals["engine_speed"].duration > 19.0
 
 
-def test_files_of_other_columns_or_stated_units_are_not_alike(days, tmp_path):
-    first = draft(days[0])
-    other = draft(day(tmp_path / "b.parquet", speed_kmh=TIME, eng_rpm=TIME + 600.0))
-    assert merged([first, other]) is None
-    assert merged([first, replace(first, time="other")]) is None
-    assert merged([first]).columns == first.columns
+def test_files_of_other_columns_or_stated_units_are_not_alike(weighbridge, days, tmp_path):
+    other = day(tmp_path / "b.parquet", speed_kmh=TIME, eng_rpm=TIME + 600.0)
+    assert len(mapped(weighbridge, tmp_path / "map.toml", days[0], other)["tables"]) == 2
 
 
 @pytest.mark.parametrize(

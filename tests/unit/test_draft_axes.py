@@ -6,7 +6,6 @@ import pytest
 
 from weighbridge import read_drives
 from weighbridge.io.draft import draft
-from weighbridge.io.draft_alike import merged
 from weighbridge.io.mapping_text import mapping_text
 
 T = np.arange(0.0, 60.0, 0.05)
@@ -31,10 +30,13 @@ def test_a_stated_unit_is_that_of_the_other_axes(tmp_path):
     assert {c.unit for c in gyro(tmp_path / "phone.csv", 2.0, names).known} == {"degps"}
 
 
-def test_a_quiet_day_takes_the_unit_of_a_lively_one(tmp_path):
-    drafts = [gyro(tmp_path / f"{size}.csv", size) for size in (2.0, 35.0)]
+def test_a_quiet_day_takes_the_unit_of_a_lively_one(weighbridge, tmp_path):
+    paths = [tmp_path / f"{size}.csv" for size in (2.0, 35.0)]
+    drafts = [gyro(path, float(path.stem)) for path in paths]
     assert [{c.unit for c in one.known} for one in drafts] == [{"radps"}, {"degps"}]
-    assert {c.unit for c in merged(drafts).known} == {"degps"}
+    assert weighbridge("map", *paths, "-o", tmp_path / "map.toml").code == 0
+    text = (tmp_path / "map.toml").read_text(encoding="utf-8")
+    assert text.count('unit = "degps"') == 3
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ from tests.noted import noted, refused, says
 import weighbridge as wb
 from weighbridge import Drive, Signal, Status, Vehicle
 from weighbridge.checks import check_drive, correct_drive
-from weighbridge.estimators import joint
+from weighbridge.estimators import ESTIMATORS
 from weighbridge.estimators.joint import changing
 from weighbridge.estimators.joint.contradicted import contradicted
 from weighbridge.navigation.select import without_accelerometer
@@ -21,6 +21,8 @@ from weighbridge.pipeline.weighing import weigh_balance
 from weighbridge.signals import QUANTITIES
 from weighbridge.simulation import make_scenario, simulate_car
 from weighbridge.vehicle.model import DraggedReading, Driveline, TorqueModel
+
+joint = ESTIMATORS["joint"]
 
 SOURCE = {"car": "engine_load", "truck": "engine_torque_fraction", "electric": "engine_torque"}
 STEPS = {"car": 1.0 / 255.0, "truck": 0.01, "electric": 0.5}

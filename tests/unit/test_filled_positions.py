@@ -6,8 +6,6 @@ import pytest
 from numpy.testing import assert_allclose
 
 import weighbridge as wb
-from weighbridge import Signal
-from weighbridge.io.filled_positions import fix_rows, true_fixes
 
 EARTH = 6.37e6
 
@@ -32,10 +30,17 @@ def filled(rate, seed=1):
     return time, np.column_stack([np.interp(time, FIXES, at[:, k]) for k in range(2)])
 
 
+def table(time, position, **more):
+    """Read such positions as a table on one clock."""
+    degrees = np.degrees(position)
+    columns = {"time_s": time, "latitude_deg": degrees[:, 0], "longitude_deg": degrees[:, 1]}
+    return wb.read_frame(pl.DataFrame(columns | more), name="table")
+
+
 @pytest.mark.parametrize("rate", [20.0, 100.0, 400.0])
 def test_only_the_fixes_are_taken(rate):
     time, position = filled(rate)
-    fixes = time[fix_rows(time, position)]
+    fixes = table(time, position).signals["latitude"].time
     moved = (FIXES < 200.0) | (FIXES > 241.0)
     nearest = np.min(np.abs(fixes[:, None] - FIXES[None, moved]), axis=0)
     assert nearest.max() < 1.5 / rate + 0.006
@@ -51,11 +56,7 @@ def test_only_the_fixes_are_taken(rate):
 def test_a_drive_says_in_one_sentence_what_was_left_out():
     time, position = filled(100.0)
     height = np.interp(time, FIXES, 200.0 + 20.0 * np.sin(FIXES / 30.0))
-    degrees = np.degrees(position)
-    columns = dict(zip(("latitude_deg", "longitude_deg"), degrees.T, strict=True))
-    clock = {"time_s": time}
-    frame = pl.DataFrame(clock | columns | {"altitude_m": height})
-    drive = wb.read_frame(frame, name="table")
+    drive = table(time, position, altitude_m=height)
     (found,) = [p for p in drive.problems if p.id == "position.filled"]
     assert found.values["period"] == pytest.approx(1.0, rel=1e-3)
     assert " 61 s" in found.values["more"]
@@ -74,9 +75,7 @@ def test_positions_that_were_recorded_stay(kind):
         position = np.radians(np.round(np.degrees(position), 7))
     elif kind == "held":
         position = driven(np.floor(time))
-    signals = {
-        name: Signal(name, time, position[:, k]) for k, name in enumerate(("latitude", "longitude"))
-    }
-    found, problems = true_fixes(signals)
-    assert problems == []
-    assert found == signals
+    drive = table(time, position)
+    assert not any(p.id == "position.filled" for p in drive.problems)
+    assert_allclose(drive.signals["latitude"].time, time)
+    assert_allclose(drive.signals["latitude"].values, position[:, 0], atol=1e-12)

@@ -9,12 +9,10 @@ from numpy.testing import assert_allclose
 from weighbridge import Drive, Signal, Vehicle
 from weighbridge.balance import Reason, force_balance
 from weighbridge.balance.floor import Floor, find_floor
-from weighbridge.balance.foot import find_foot, unsmoothed
-from weighbridge.balance.foot_setup import learn_dragged, near
 from weighbridge.constants import GRAVITY
 from weighbridge.kernels import two_states
 from weighbridge.navigation.motion import Motion
-from weighbridge.vehicle.model import Driveline, RoadLoad, Timing, TorqueModel
+from weighbridge.vehicle.model import DraggedReading, Driveline, RoadLoad, Timing, TorqueModel
 
 END = 1200.0
 CLOCK = np.arange(0.0, END, 0.05)
@@ -79,7 +77,18 @@ def reasons(drive, car=CAR, **balance):
     return force_balance(drive, car, motion(), **balance).table.reason
 
 
+def near(mask, reach):
+    """Return the stamps within a time of a marked one."""
+    marked = STAMPS[mask]
+    after = np.clip(np.searchsorted(marked, STAMPS), 1, marked.size - 1)
+    distance = np.minimum(np.abs(STAMPS - marked[after - 1]), np.abs(STAMPS - marked[after]))
+    return distance <= reach
+
+
 LOADED = replace(CAR, torque=TorqueModel(source="load", coefficients=(-FULL * FLOOR, FULL)))
+DRAGS = DraggedReading(
+    engine_speed=(100.0, 150.0, 250.0), level=(FLOOR, FLOOR, FLOOR), scatter=0.01, span=0.8
+)
 
 
 @pytest.mark.parametrize("source", ["measured", "load"])
@@ -98,7 +107,7 @@ def test_no_row_is_braked_and_most_that_push_are_used(source, noise):
 def test_a_brake_switch_leaves_the_dragged_rows_of_a_torque():
     switch = (braked(STAMPS) > 0.0).astype(float)
     found = reasons(recorded(engine_torque=torque_of(STAMPS), brake_switch=switch))
-    away = ~near(STAMPS, switch > 0.5, STAMPS, 0.35)
+    away = ~near(switch > 0.5, 0.35)
     assert np.all(found[switch > 0.5] == Reason.BRAKING)
     assert np.all(found[away & (foot(STAMPS) < 0.5)] == Reason.USED)
 
@@ -175,38 +184,22 @@ def test_a_foot_that_taps_the_brake_is_found_through_the_smoothing():
     source = drive.signals["engine_load"]
     # The smoothed reading stays far off its floor.
     assert np.min(source.values[(STAMPS % 30.0 > 9.0) & (STAMPS % 30.0 < 12.0)]) > FLOOR + 0.08
-    unknown = np.full(STAMPS.size, np.nan)
-    off = find_foot(drive, LOADED, source, unknown, unknown).off
-    assert np.all(off[(STAMPS % 30.0 > 10.0) & (STAMPS % 30.0 < 10.4)])
-    assert not np.any(off[(STAMPS % 30.0 > 3.0) & (STAMPS % 30.0 < 8.0)])
+    found = force_balance(drive, LOADED, motion(braking=False), lag=lag).table.reason
+    assert not np.any(found[(STAMPS % 30.0 > 10.0) & (STAMPS % 30.0 < 10.4)] == Reason.USED)
+    assert not np.any(found[(STAMPS % 30.0 > 3.0) & (STAMPS % 30.0 < 8.0)] == Reason.OVERRUN)
 
 
 def test_idle_charge_in_overrun_reads_above_the_floor():
     """Half of the dragged stretches read 0.09 above the floor, as light pushing does."""
     high = (STAMPS % 40.0) < 20.0
-    read = load_of(STAMPS) + 0.09 * (high & (foot(STAMPS) < 0.5))
-    drive = recorded(engine_load=read)
-    source = drive.signals["engine_load"]
+    dragged = foot(STAMPS) < 0.5
+    read = load_of(STAMPS) + 0.09 * (high & dragged)
     made = motion(braking=False)
-    torque = np.interp(STAMPS, CLOCK, MASS * (made.accel + 0.01 * GRAVITY) / GEARING)
-    need = torque * GEARING / MASS / GRAVITY - 0.02 * (foot(STAMPS) < 0.5)
-    off = find_foot(drive, LOADED, source, need, torque).off
-    dragged = ~near(STAMPS, foot(STAMPS) > 0.5, STAMPS, 0.6)
-    assert np.all(off[dragged & high])
-    blind = np.full(STAMPS.size, np.nan)
-    assert not np.all(find_foot(drive, LOADED, source, blind, blind).off[dragged & high])
-
-
-def test_the_floor_is_that_of_engine_speeds_at_which_it_was_dragged():
-    random = np.random.default_rng(2)
-    turning = random.uniform(100.0, 400.0, 8000)
-    dragged = (random.random(8000) < 0.2) & (turning < 250.0)
-    read = np.where(dragged, 0.05 + 1e-4 * turning, random.uniform(0.25, 1.0, 8000))
-    floor = find_floor(read + 0.004 * random.standard_normal(8000), turning)
-    assert_allclose(floor.at(np.array([120.0, 200.0])), [0.062, 0.07], atol=0.012)
-    # Never dragged at 380 rad/s: lowest readings there are no floor.
-    assert floor.at(np.array([380.0]))[0] < 0.2
-    assert find_floor(random.uniform(0.4, 1.0, 8000), turning) is None
+    slowed = made.specific_force - 0.02 * GRAVITY * (foot(CLOCK) < 0.5)
+    moved = replace(made, specific_force=slowed, accel=slowed)
+    found = force_balance(recorded(engine_load=read), LOADED, moved).table.reason
+    assert not np.any(found[~near(~dragged, 0.6) & high] == Reason.USED)
+    assert np.mean(found[~dragged] == Reason.USED) > 0.85
 
 
 def test_where_nothing_tells_of_the_brake_that_is_said():
@@ -235,62 +228,38 @@ def test_a_drive_that_shows_no_floor_has_that_of_the_vehicle_file():
     """A cruise on which the engine is dragged for a twentieth of the time, and braked."""
     dragged = (STAMPS % 40.0) > 38.0
     read = np.where(dragged, FLOOR + 0.01, 0.3 + 0.05 * np.sin(0.7 * STAMPS))
-    turning = np.full(STAMPS.size, 150.0)
-    assert find_floor(read[::4], turning[::4]) is None
-    rare = Drive("rare", {
-        "engine_load": Signal("engine_load", STAMPS[::4], read[::4]),
-        "engine_speed": Signal("engine_speed", STAMPS[::4], turning[::4]),
-    })  # fmt: skip
-    source = rare.signals["engine_load"]
-    unknown = np.full(len(source), np.nan)
-    alone = find_foot(rare, LOADED, source, unknown, unknown)
-    assert not alone.observable
-
-    town = recorded(engine_load=load_of(STAMPS))
-    learnt = learn_dragged([town], [town.signals["engine_load"]], [np.full(STAMPS.size, np.nan)])
-    assert np.interp(150.0, learnt.engine_speed, learnt.level) == pytest.approx(FLOOR, abs=0.01)
-    known = find_foot(rare, replace(LOADED, dragged=learnt), source, unknown, unknown)
-    assert known.observable
-    assert np.all(known.off[dragged[::4]])
-    assert np.mean(known.off[~dragged[::4]]) < 0.15
-
-
-def test_the_floor_of_the_file_follows_a_small_drift_alone():
-    file = Floor(np.array([100.0, 200.0, 300.0]), np.array([0.05, 0.05, 0.05]), 0.01, 0.8)
-    drive = Floor(np.array([100.0, 200.0, 300.0]), np.array([0.06, 0.04, 0.2]), 0.01, 0.8)
-    assert_allclose(file.lifted(drive).level, [0.06, 0.05, 0.05])
+    slowed = np.where(CLOCK % 40.0 > 38.0, -0.6, 0.1) + 0.05 * np.sin(0.37 * CLOCK)
+    moved = replace(motion(), specific_force=slowed, accel=slowed)
+    rare = recorded(engine_load=read, engine_speed=150.0 + 9.0 * np.sin(0.11 * STAMPS))
+    rare = rare.with_signals(*(Signal(s.name, s.time[::4], s.values[::4])
+                               for s in rare.signals.values()))  # fmt: skip
+    alone = force_balance(rare, LOADED, moved)
+    assert alone.brake_hidden
+    known = force_balance(rare, replace(LOADED, dragged=DRAGS), moved)
+    assert not known.brake_hidden
+    found = known.table.reason
+    assert not np.any(found[dragged[::4]] == Reason.USED)
+    assert np.mean(found[~dragged[::4]] == Reason.OVERRUN) < 0.15
 
 
 def test_a_reading_that_has_risen_far_is_found_by_the_motion():
-    town = recorded(engine_load=load_of(STAMPS))
-    unknown = np.full(STAMPS.size, np.nan)
-    learnt = learn_dragged([town], [town.signals["engine_load"]], [unknown])
-    car = replace(LOADED, dragged=learnt)
+    car = replace(LOADED, dragged=DRAGS)
     risen = recorded(engine_load=load_of(STAMPS) + 0.12)
-    source = risen.signals["engine_load"]
     off = foot(STAMPS) < 0.5
-    need = np.where(off, -0.05, 0.05)
-    by_motion = find_foot(risen, car, source, need, unknown)
-    assert by_motion.observable
-    assert np.mean(by_motion.off[off]) > 0.8
-    # Without a grade nothing shows it: a vehicle that stops has been dragged somewhere.
-    held = np.where(off, 0.4, source.values)
-    speed = np.where((STAMPS % 200.0) > 196.0, 0.0, 15.0)
-    stops = recorded(engine_load=held, vehicle_speed=speed)
-    assert not find_foot(stops, car, stops.signals["engine_load"], unknown, unknown).observable
-    cruise = recorded(engine_load=held)
-    assert find_foot(cruise, car, cruise.signals["engine_load"], unknown, unknown).observable
+    need = np.where(foot(CLOCK) < 0.5, -0.5, 0.5)
+    moved = replace(motion(), specific_force=need, accel=need)
+    found = force_balance(risen, car, moved)
+    assert not found.brake_hidden
+    assert np.mean(found.table.reason[off] != Reason.USED) > 0.8
 
 
 def test_a_noisy_reading_chooses_no_rows_where_the_engine_surely_pushes():
     asked = 0.3 + 0.1 * np.sin(0.31 * STAMPS)
     noise = 0.08 * np.random.default_rng(6).standard_normal(STAMPS.size)
     read = np.where(foot(STAMPS) > 0.5, asked + noise, FLOOR)
-    drive = recorded(engine_load=read)
-    beside = near(STAMPS, foot(STAMPS) < 0.5, STAMPS, 2.5)
-    torque = np.where(foot(STAMPS) > 0.5, (asked - FLOOR) * FULL, DRAGGED)
-    found = find_foot(drive, LOADED, drive.signals["engine_load"], torque / 1e4, torque)
-    assert np.mean(found.off[~beside]) < 0.02
+    found = reasons(recorded(engine_load=read), LOADED)
+    beside = near(foot(STAMPS) < 0.5, 2.5)
+    assert np.mean(found[~beside] == Reason.OVERRUN) < 0.02
 
 
 def test_an_engine_brake_does_not_hide_a_dragged_engine():
@@ -298,15 +267,6 @@ def test_an_engine_brake_does_not_hide_a_dragged_engine():
     read = np.where(braking, -120.0, torque_of(STAMPS))
     found = reasons(recorded(engine_torque=read))
     assert not np.any((found == Reason.USED) & (foot(STAMPS) < 0.5))
-
-
-def test_unsmoothed_undoes_a_first_order_lag():
-    time = np.arange(0.0, 3.0, 0.25)
-    read = 0.4 * np.exp(-time / 0.3)
-    sharp, gain = unsmoothed(Signal("engine_load", time, read), 0.25)
-    assert_allclose(sharp[1:], 0.0, atol=1e-12)
-    assert np.all(gain[1:] > 1.0)
-    assert np.isnan(sharp[0])
 
 
 def test_two_states_equal_the_sum_over_all_paths():
@@ -323,3 +283,21 @@ def test_two_states_equal_the_sum_over_all_paths():
         total += weight
         first += weight * bits
     assert_allclose(two_states.posterior(ratio, time, stay, np.inf), first / total, rtol=1e-9)
+
+
+def test_the_floor_is_that_of_engine_speeds_at_which_it_was_dragged():
+    random = np.random.default_rng(2)
+    turning = random.uniform(100.0, 400.0, 8000)
+    dragged = (random.random(8000) < 0.2) & (turning < 250.0)
+    read = np.where(dragged, 0.05 + 1e-4 * turning, random.uniform(0.25, 1.0, 8000))
+    floor = find_floor(read + 0.004 * random.standard_normal(8000), turning)
+    assert_allclose(floor.at(np.array([120.0, 200.0])), [0.062, 0.07], atol=0.012)
+    # Never dragged at 380 rad/s: lowest readings there are no floor.
+    assert floor.at(np.array([380.0]))[0] < 0.2
+    assert find_floor(random.uniform(0.4, 1.0, 8000), turning) is None
+
+
+def test_the_floor_of_the_file_follows_a_small_drift_alone():
+    file = Floor(np.array([100.0, 200.0, 300.0]), np.array([0.05, 0.05, 0.05]), 0.01, 0.8)
+    drive = Floor(np.array([100.0, 200.0, 300.0]), np.array([0.06, 0.04, 0.2]), 0.01, 0.8)
+    assert_allclose(file.lifted(drive).level, [0.06, 0.05, 0.05])

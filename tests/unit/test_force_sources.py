@@ -9,7 +9,6 @@ from tests.noted import refused
 import weighbridge as wb
 from weighbridge.papers.jensen2022_drives import without_weather
 from weighbridge.simulation import make_scenario, random_vehicle, simulate_car, usual_polling
-from weighbridge.vehicle.as_read import as_read
 from weighbridge.vehicle.model import Driveline, TorqueModel
 from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
 
@@ -145,15 +144,6 @@ def test_one_wheel_of_an_axle_is_refused(driven):
     wheel = driven["petrol_dct"][1][1]["wheel_torque_front"]
     drive = drive.with_signals(replace(wheel, name="wheel_torque_fl"))
     assert TORQUE_SOURCES["wheel_torque"].refusal(drive, "front").id == "torque.one_wheel"
-
-
-def test_a_vehicle_as_read_twice_is_the_same():
-    for source in ("wheel_torque", "battery"):
-        car = wb.Vehicle(torque=TorqueModel(source=source))
-        once = as_read(car)
-        assert as_read(once) == once
-    plain = wb.Vehicle(torque=TorqueModel(source="power"))
-    assert as_read(plain) is plain
 
 
 def test_the_sign_of_the_current_does_not_matter(driven):

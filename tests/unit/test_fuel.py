@@ -8,11 +8,13 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import weighbridge as wb
 from weighbridge import Drive, Signal, Vehicle
-from weighbridge.estimators import joint
+from weighbridge.estimators import ESTIMATORS
 from weighbridge.estimators.regression import regression
 from weighbridge.simulation import MIDSIZE, Polling, Scenario, Sensors, short_route, simulate_car
 from weighbridge.vehicle.fuel import DENSITY, SEEN, Burnt, fuel_burnt, fuel_flow
 from weighbridge.vehicle.model import Driveline
+
+joint = ESTIMATORS["joint"]
 
 GEARED = Vehicle(kind="car", driveline=Driveline(gearings=(12.0, 7.0, 4.0)))
 HOUR = np.arange(0.0, 3600.5, 0.5)

@@ -8,13 +8,11 @@ from scipy.integrate import solve_ivp
 from tests.noted import error
 
 from weighbridge import ConfigError
-from weighbridge.balance.law import STANDARD_DENSITY, needed_force, rotating_mass
 from weighbridge.constants import GRAVITY
 from weighbridge.estimators.settings import changed, parsed
 from weighbridge.papers import PAPERS, galvao, galvao_drives, galvao_torque
 from weighbridge.papers.galvao_bounds import (
     FAST,
-    SHEET,
     SLOW,
     STEP,
     coasting_speed,
@@ -23,7 +21,6 @@ from weighbridge.papers.galvao_bounds import (
 )
 from weighbridge.papers.galvao_drives import CAR
 from weighbridge.papers.galvao_figures import PAPER_WORST, item_figures
-from weighbridge.papers.galvao_statistics import rank_correlation, slope
 from weighbridge.papers.galvao_torque import (
     WAYS,
     TorqueTrial,
@@ -32,7 +29,6 @@ from weighbridge.papers.galvao_torque import (
     torque_table,
     torque_trial,
 )
-from weighbridge.vehicle.air import dynamic_pressure
 
 PAPERS_DURATION = galvao_drives.DURATION
 BRIEF = 600.0
@@ -181,14 +177,6 @@ def test_report_has_the_papers_nine_figures(done):
         assert sum(f"(fig. {number})" in title for title in titles) == 1
 
 
-def test_slope_is_that_of_the_straight_line():
-    masses = np.array([1000.0, 1100.0, 1300.0, 1400.0])
-    found, std = slope(masses, 300.0 + 0.5 * masses)
-    assert found == pytest.approx(0.5)
-    assert std == pytest.approx(0.0, abs=1e-9)
-    assert rank_correlation(masses, np.array([1.0, 2.0, 3.0, 1e9])) == pytest.approx(1.0)
-
-
 def test_page_begins_with_the_papers_figures(done, tmp_path, monkeypatch):
     monkeypatch.setattr(galvao, "reproduce", lambda **_: done)
     page = tmp_path / "page.html"
@@ -263,11 +251,6 @@ def test_a_coast_down_is_that_of_the_longitudinal_law(head_wind):
     time = STEP * np.arange(speed.size)
     stepped = solve_ivp(slowed, (0.0, time[-1]), [FAST], t_eval=time, rtol=1e-9, atol=1e-9).y[0]
     np.testing.assert_allclose(speed, stepped, atol=1e-4)
-    # And by the law's own terms no force is left over.
-    accel = np.gradient(speed, STEP, edge_order=2)
-    pressure = dynamic_pressure(STANDARD_DENSITY, speed + head_wind)
-    force, weight = needed_force(SHEET, accel, pressure, rotating_mass(SHEET, 0.0))
-    assert np.max(np.abs(force)) < 1e-5 * weight
 
 
 def test_speed_alone_bounds_the_mass_and_tells_the_drag_over_it(done):

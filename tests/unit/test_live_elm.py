@@ -11,9 +11,8 @@ from weighbridge import ConfigError
 from weighbridge.errors import SourceError
 from weighbridge.live.feed import Feed
 from weighbridge.live.sources import parse_source
-from weighbridge.live.sources.elm import SETUP, ElmCarrier, ElmSource
+from weighbridge.live.sources.elm import SETUP, ElmCarrier
 from weighbridge.live.sources.elm_text import read_reply, read_voltage
-from weighbridge.live.sources.links import SerialLink
 
 elmulator = pytest.importorskip("elmulator")
 pytest.importorskip("serialx")
@@ -240,9 +239,9 @@ def test_engine_that_starts_is_noticed_by_the_battery(tmp_path, monkeypatch):
 def test_port_where_nothing_answers(monkeypatch):
     master, slave = os.openpty()
     tty.setraw(slave)
-    source = ElmSource("elm:mute", (lambda: SerialLink(os.ttyname(slave), 38400),))
+    source = parse_source(f"elm:{os.ttyname(slave)}@38400")
     monkeypatch.setattr("weighbridge.live.sources.elm._RESET", 0.1)
-    with error(SourceError, "elm:mute ELM327"):
+    with error(SourceError, os.ttyname(slave), "ELM327"):
         source.run(lambda _: None, Event())
     os.close(master)
     os.close(slave)

@@ -18,8 +18,7 @@ from weighbridge.live.outputs.terminal import (
     plain_line,
     terminal,
 )
-from weighbridge.live.outputs.words import needed_text, overload_text, rate_text
-from weighbridge.live.weighing import AlertState, SignalHealth
+from weighbridge.live.weighing import AlertState
 
 
 def text(found):
@@ -74,26 +73,6 @@ def test_a_view_without_a_mass_or_permitted_mass_shows_what_there_is():
     assert "nan" not in shown.lower()
     assert "permitted" not in shown
     assert "± 2 %: not by driving on" in shown
-
-
-def test_what_driving_on_never_reaches_says_what_is_left_open():
-    w = weighing(minutes_to_2=math.inf, reach=0.02001)
-    assert needed_text(w) == (
-        "± 5 %: reached, ± 2 %: not by driving on, vehicle file and sensors leave ± 2.1 %"
-    )
-    both = weighing(minutes_to_2=math.inf, minutes_to_5=math.inf, reach=0.063)
-    assert needed_text(both) == (
-        "± 5 %, ± 2 %: not by driving on, vehicle file and sensors leave ± 6.3 %"
-    )
-
-
-def test_a_limit_takes_the_place_of_a_permitted_mass():
-    limit = AlertState(limit=2000.0, side="above", active=True, probability=0.97)
-    assert overload_text(weighing(gross=None, alerts=(limit,))) == (
-        "above 2000 kg with probability 97 %"
-    )
-    below = AlertState(limit=2000.0, side="below", active=False, probability=0.03)
-    assert "no permitted mass" in overload_text(weighing(gross=None, alerts=(below,)))
 
 
 def test_control_characters_of_a_name_do_not_act():
@@ -176,12 +155,6 @@ def test_a_parked_vehicle_has_no_signal_that_fails():
     assert any("parked" in line for line in shown)
     assert any(line.startswith("latitude") and "rests" in line for line in shown)
     assert "not:" not in plain_line(weighing(parked=True, signals=rests()))
-
-
-def test_a_slow_signal_shows_its_period():
-    slow = SignalHealth(name="ambient_temperature", rate=1.0 / 30.0, age=20.0, period=30.0)
-    assert rate_text(slow) == "1/30 s"
-    assert rate_text(replace(slow, rate=0.0)) == "–"
 
 
 def test_plain_lines_go_on_when_the_clock_begins_anew():

@@ -5,9 +5,8 @@ import pytest
 from numpy.testing import assert_allclose
 from tests.noted import refused
 
-from weighbridge import Drive, Signal
+from weighbridge import Drive, DriveError, Signal
 from weighbridge.constants import GRAVITY
-from weighbridge.navigation.longitudinal import longitudinal_motion
 from weighbridge.navigation.select import find_motion
 
 TIME = np.arange(0.0, 600.0, 0.1)
@@ -42,7 +41,7 @@ def inner(motion):
 @pytest.mark.parametrize("height", [True, False])
 @pytest.mark.parametrize("offset", [0.0, 0.4, -0.3])
 def test_offset_is_found_from_the_energy(offset, height):
-    motion = longitudinal_motion(made(offset=offset, height=height))
+    motion = find_motion(made(offset=offset, height=height))
     k = inner(motion)
     assert motion.source == "longitudinal_accel"
     assert_allclose(motion.specific_force[k], np.interp(motion.time, TIME, FORCE)[k], atol=0.06)
@@ -53,7 +52,7 @@ def test_offset_is_found_from_the_energy(offset, height):
 
 
 def test_grade_and_acceleration_are_told_apart():
-    motion = longitudinal_motion(made(offset=0.2))
+    motion = find_motion(made(offset=0.2))
     k = inner(motion)
     assert_allclose(motion.grade[k], np.interp(motion.time, TIME, GRADE)[k], atol=0.004)
     assert_allclose(motion.accel[k], np.interp(motion.time, TIME, ACCEL)[k], atol=0.08)
@@ -61,7 +60,7 @@ def test_grade_and_acceleration_are_told_apart():
 
 @pytest.mark.parametrize("late", [0.0, 0.35])
 def test_lateness_of_the_speed(late):
-    motion = longitudinal_motion(made(late=late))
+    motion = find_motion(made(late=late))
     assert motion.speed_delay == pytest.approx(late, abs=0.03)
     k = inner(motion)
     assert_allclose(motion.speed[k], speed(motion.time)[k], atol=0.1)
@@ -71,17 +70,17 @@ def test_gaps_are_not_valid():
     drive = made()
     keep = (TIME < 200.0) | (TIME > 230.0)
     s = drive.signals["longitudinal_accel"]
-    motion = longitudinal_motion(drive.with_signals(Signal(s.name, TIME[keep], s.values[keep])))
+    motion = find_motion(drive.with_signals(Signal(s.name, TIME[keep], s.values[keep])))
     assert not motion.valid[(motion.time > 202.0) & (motion.time < 228.0)].any()
     assert motion.valid[motion.time < 198.0].all()
 
 
 def test_what_is_missing_or_short_is_told():
     drive = made()
-    with refused("motion.missing"):
-        longitudinal_motion(drive.without("vehicle_speed"))
+    with pytest.raises(DriveError, match="vehicle_speed"):
+        find_motion(drive.without("vehicle_speed"))
     with refused("motion.overlap"):
-        longitudinal_motion(drive.between(0.0, 15.0))
+        find_motion(drive.between(0.0, 15.0))
 
 
 def test_it_is_preferred_to_speed_alone():

@@ -3,13 +3,12 @@ import math
 from dataclasses import asdict
 
 import pytest
-from hypothesis import example, given
+from hypothesis import given
 from hypothesis import strategies as st
 from tests.unit.made_weighings import weighing
 
 from weighbridge.live.outlook import outlook
 from weighbridge.live.outputs.lines import json_line
-from weighbridge.live.outputs.words import remaining_text
 
 
 def told(mass, std, floor):
@@ -38,17 +37,6 @@ def test_never_is_told_from_not_known(mass, std, floor, never, known):
         assert (minutes is not None) == (percent in known)
         assert math.isnan(getattr(made, f"minutes_to_{percent}")) == (percent not in never + known)
         assert (minutes is None and reach is not None and reach >= percent) == (percent in never)
-
-
-@given(st.floats(1.0, 200.0), st.floats(0.0, 0.06))
-@example(2000.0 * 0.05 / 1.96, 0.05 / 1.96)
-def test_json_says_what_the_words_say(noise, floor):
-    mass = 2000.0
-    line, made = told(mass, math.hypot(noise, floor * mass), floor)
-    for percent, minutes in ((2, made.minutes_to_2), (5, made.minutes_to_5)):
-        by_json = line[f"minutes_to_{percent}_percent"] is None
-        by_json = by_json and line["reach_percent"] >= percent
-        assert by_json == ("not by driving on" in remaining_text(minutes, percent, made.reach))
 
 
 @given(st.floats(1.0, 300.0), st.floats(0.0, 0.06), st.floats(60.0, 2700.0))

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-from weighbridge.estimators.joint import JointSettings
+from weighbridge.estimators import ESTIMATORS
 from weighbridge.estimators.joint.load_stops import change_odds
 from weighbridge.estimators.joint.possible import FEWEST, PossibleChange, averaged
 from weighbridge.estimators.joint.problem import UNMODELLED, FilterInput, filter_params
 from weighbridge.kernels import disturbance
 
 MASS, WINDOWS, NOISE = 3000.0, 240, 100.0
-SETTINGS = JointSettings()
+SETTINGS = ESTIMATORS["joint"].settings()
 STD = np.array([MASS, 20.0, 30.0, 1e-3, 1e-3, 1e-3, 1e-3])
 
 

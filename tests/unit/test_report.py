@@ -11,7 +11,7 @@ from html.parser import HTMLParser
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_allclose
 from tests.noted import error, noted
 
 from weighbridge import ConfigError, Drive, DriveInfo, Segment, Signal, Status, Vehicle, Weighing
@@ -19,10 +19,6 @@ from weighbridge.balance import ForceBalance, ForceTable, Reason
 from weighbridge.estimators import MassTrack
 from weighbridge.navigation.motion import Motion
 from weighbridge.report import mass_figure, write_report
-from weighbridge.report.document import Page, packed
-from weighbridge.report.style import REASON_STYLE, Panel, blank
-from weighbridge.report.table import Table
-from weighbridge.report.thinning import LINE_POINTS, spread, thin_line
 from weighbridge.results.calibration import Calibration, DelaySearch, FittedRows
 from weighbridge.vehicle.gear import detect_gearings
 from weighbridge.vehicle.model import Driveline, Provenance, RoadLoad, TorqueModel
@@ -216,6 +212,25 @@ def numbers(array):
     return np.asarray(array, dtype=np.float64)
 
 
+def over(html, axis, across=""):
+    """Return the figures of a page over such an axis, with such words on the other one."""
+    titled = [f["layout"] for f in figures(html).values()]
+    return [
+        figure
+        for figure, layout in zip(figures(html).values(), titled, strict=True)
+        if layout["xaxis"]["title"]["text"] == axis
+        and across in layout.get("yaxis", {}).get("title", {}).get("text", "")
+    ]
+
+
+def table(html, key):
+    """Return the rows of the table in a section, by their first cells."""
+    inside = re.search(rf'<section id="[^"]*{key}">(.*?)</section>', html, re.S).group(1)
+    rows = re.findall(r"<tr[^>]*>(.*?)</tr>", inside)
+    cells = [re.findall(r"<td[^>]*>(.*?)</td>", row) for row in rows]
+    return {first: rest for first, *rest in filter(None, cells)}
+
+
 def titles(html):
     return re.findall(r"<h4>([^<]*)</h4><div class=\"plot\"", html)
 
@@ -271,15 +286,10 @@ def test_names_are_escaped_everywhere(tmp_path):
     ]
     assert "<script>alert(1)</script><b>&\"'" in page.text
     assert page.matched
-
-
-def test_figure_data_cannot_end_their_script():
-    figure = blank("x [m]", "y [m]")
-    figure.add_scatter(x=[0.0], y=[0.0], name="</script><script>")
-    page = Page()
-    page.place([Panel(title="t", figure=figure)])
-    assert re.fullmatch("[A-Za-z0-9+/=]+", packed(page.data()))
-    assert json.loads(page.data())["figure-1"]["data"][0]["name"] == "</script><script>"
+    # Texts of figures cannot end the script that holds them.
+    html = written(tmp_path, [weighing], calibration=make_calibration(weighing), title=evil)
+    data = re.search(r'id="figures">(.*?)</script>', html, re.S).group(1)
+    assert re.fullmatch("[A-Za-z0-9+/=]+", data)
 
 
 def test_several_drives_are_compared_in_a_table(tmp_path):
@@ -455,54 +465,26 @@ def test_mass_figure_has_the_known_mass_of_the_drive():
     assert [any("true mass" in name for name in names) for names in named] == [True, False]
 
 
-def test_thinning_keeps_extremes_ends_and_gaps():
-    rng = np.random.default_rng(5)
-    x = np.linspace(0.0, 100.0, 200_000)
-    y = rng.normal(size=x.size)
-    y[123_456], y[23_456] = 50.0, -40.0
-    y[80_000:90_000] = np.nan
-    thin_x, thin_y, other = thin_line(x, y, 2.0 * y)
-    assert thin_x.size <= LINE_POINTS + 2
-    assert thin_x[0] == 0.0
-    assert thin_x[-1] == 100.0
-    assert np.nanmax(thin_y) == 50.0
-    assert np.nanmin(thin_y) == -40.0
-    assert_array_equal(other, 2.0 * thin_y)
-    gap = np.flatnonzero(np.isnan(thin_y))
-    assert gap.size == 1
-    assert x[79_000] < thin_x[gap[0] - 1] <= thin_x[gap[0]] <= x[91_000]
-
-
-@pytest.mark.parametrize("size", [0, 1, 5])
-def test_short_lines_are_kept_whole(size):
-    x = np.arange(size, dtype=np.float64)
-    thin_x, thin_y = thin_line(x, x**2)
-    assert_array_equal(thin_x, x)
-    assert_array_equal(thin_y, x**2)
-
-
-def test_spread_is_even_over_the_marked_rows():
-    marked = np.zeros(100_000, dtype=bool)
-    marked[10_000:60_000] = True
-    index = spread(marked, 500)
-    assert index.size == 500
-    assert marked[index].all()
-    assert index[0] == 10_000
-    assert index[-1] == 59_999
-    assert np.ptp(np.diff(index)) <= 1
-    assert_array_equal(spread(marked, 60_000), np.arange(10_000, 60_000))
+def test_a_long_line_keeps_its_extremes_its_ends_and_its_gap(tmp_path):
+    weighing = make_weighing(hours=4.0)
+    table = weighing.result.balance.table
+    speed = table.speed.copy()
+    speed[23_456], speed[40_123] = 50.0, 0.25
+    grade = np.where((table.time > 3000.0) & (table.time < 4500.0), np.nan, table.grade)
+    table = replace(table, speed=speed, grade=grade)
+    motion = replace(weighing.result.balance.motion, speed=speed, grade=grade)
+    result = replace(weighing.result, balance=ForceBalance(motion=motion, table=table))
+    html = written(tmp_path, [replace(weighing, result=result)])
+    (figure,) = over(html, "Time since start [min]", "Speed")
+    x, y = (numbers(figure["data"][0][axis]) for axis in "xy")
+    assert x.size < 0.1 * speed.size
+    assert np.nanmax(y) == pytest.approx(180.0, rel=1e-4)
+    assert (x[0], x[-1]) == pytest.approx((0.0, 240.0), abs=0.01)
+    assert np.all(np.diff(x[np.isfinite(y)]) >= 0.0)
+    road = over(html, "Distance [km]", "rade")[0]["data"][-1]
+    assert np.isnan(numbers(road["y"])).any()
 
 
 def test_report_loads_plotly_only_when_used():
     code = "import sys, weighbridge.report; sys.exit('plotly' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
-
-
-def test_every_reason_has_its_mark():
-    assert set(REASON_STYLE) == set(Reason)
-
-
-def test_given_tables_come_first(tmp_path):
-    given = Table("The paper's", ("figure", "paper"), (("RMSE <of all>", "1 kg"),))
-    text = Elements(written(tmp_path, [make_weighing()], tables=(given,))).text
-    assert 0 < text.index("RMSE <of all>") < text.index("Mass over time")

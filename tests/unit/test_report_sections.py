@@ -5,33 +5,26 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_allclose
 from tests.noted import error
-from tests.unit.test_report import GEARINGS, VEHICLE, Elements, figures, make_weighing, numbers
+from tests.unit.test_report import (
+    GEARINGS,
+    VEHICLE,
+    Elements,
+    figures,
+    make_weighing,
+    numbers,
+    over,
+    table,
+    written,
+)
 from tests.unit.test_weighing import weighing as weighed_by_rls
 
-from weighbridge import ConfigError, Drive, DriveInfo, Signal, Status, Weighing, compare
+from weighbridge import ConfigError, Drive, DriveInfo, Signal, Weighing, compare
 from weighbridge.balance import ForceBalance, ForceTable, Reason
-from weighbridge.balance.instants import WIND_AT_VEHICLE
-from weighbridge.estimators import ESTIMATORS, joint
+from weighbridge.estimators import ESTIMATORS
 from weighbridge.navigation.motion import Motion
 from weighbridge.report import write_report
-from weighbridge.report.information_section import (
-    Manoeuvre,
-    _net_gain,
-    information_gained,
-    information_section,
-    manoeuvres,
-)
-from weighbridge.report.methods_section import method_style, methods_section
-from weighbridge.report.residual_section import (
-    WITH_SLOW,
-    bin_width,
-    binned,
-    residual_section,
-)
-from weighbridge.report.slow_section import LONGEST_ARROW, slow_section, wind_at_vehicle
-from weighbridge.report.style import band, blank
 from weighbridge.vehicle.model import Provenance
 
 MASS = 1500.0
@@ -99,7 +92,7 @@ def driven(
         squat=0.0,
         squat_std=0.0,
     )
-    table = ForceTable(
+    forces = ForceTable(
         time=time,
         traction_force=traction,
         force_std=np.full(n, 40.0),
@@ -118,8 +111,9 @@ def driven(
         fuel_burnt=np.zeros(n),
         reason=reason,
     )
-    track = joint.estimate(ForceBalance(motion=motion, table=table), CAR)
-    told = np.hypot(*reported) / WIND_AT_VEHICLE
+    track = ESTIMATORS["joint"].track(ForceBalance(motion=motion, table=forces), CAR)
+    # A vehicle feels half of the wind that a weather station measures 10 m high.
+    told = np.hypot(*reported) / 0.5
     info = DriveInfo(wind_speed=told or None, wind_from=np.arctan2(reported[1], reported[0]))
     drive = Drive("driven", {"vehicle_speed": Signal("vehicle_speed", time, speed)}, info=info)
     return Weighing(
@@ -158,43 +152,47 @@ def round_trip():
     }
 
 
-def test_launches_weigh_a_drive_of_launches():
+def shares(html):
+    """Return information and time of each manoeuvre [%], and its minutes."""
+    return {
+        name: tuple(float(cell.rstrip(" %")) for cell in (row[0], row[1], row[3]))
+        for name, row in table(html, "information").items()
+    }
+
+
+def test_launches_weigh_a_drive_of_launches(tmp_path):
     w = driven(launches())
     assert w.mass == pytest.approx(MASS, rel=0.01)
-    gained = information_gained(w.result)
-    assert gained.gain.sum() == pytest.approx(1.0)
-    assert (gained.gain >= 0.0).all()
-    assert gained.shares(gained.gain)[Manoeuvre.LAUNCH] > 0.9
+    gained = shares(written(tmp_path, [w]))
+    assert sum(g[0] for g in gained.values()) == pytest.approx(100.0, abs=2.0)
+    assert gained["launch"][0] > 90.0
 
 
-def test_hills_weigh_a_drive_at_an_even_speed():
+def test_hills_weigh_a_drive_at_an_even_speed(tmp_path):
     t = np.arange(0.0, 1200.0, 1.0 / RATE)
     up_and_level = 0.05 * (np.sin(2.0 * np.pi * t / 120.0) > 0.0)
-    w = driven(np.full(t.size, 15.0), grade=up_and_level)
-    gained = information_gained(w.result)
-    shares = gained.shares(gained.gain)
-    assert shares.sum() == pytest.approx(1.0)
+    gained = shares(written(tmp_path, [driven(np.full(t.size, 15.0), grade=up_and_level)]))
     # On the level between, the force that is no mass becomes known.
-    assert shares[Manoeuvre.HILL] > 0.4
-    assert shares[Manoeuvre.HILL] + shares[Manoeuvre.CRUISE] == pytest.approx(1.0, abs=0.01)
-    minutes = gained.shares(gained.duration) / 60.0
-    assert_allclose(minutes[[Manoeuvre.HILL, Manoeuvre.CRUISE]], 10.0, rtol=0.08)
+    assert gained["hill"][0] > 40.0
+    assert gained["hill"][0] + gained["cruise"][0] == pytest.approx(100.0, abs=1.0)
+    assert_allclose([gained["hill"][2], gained["cruise"][2]], 10.0, rtol=0.08)
 
 
-def test_the_first_manoeuvre_that_holds_is_the_name():
-    #        launch, after shift, late, slowing on a hill, hill down, cruise
-    speed = np.array([5.0, 15.0, 15.0, 15.0, 15.0, 15.0])
-    accel = np.array([1.0, 1.0, 1.0, -1.0, 0.0, 0.1])
-    slope = np.array([0.05, 0.0, 0.0, 0.05, -0.03, 0.01])
-    named = manoeuvres(np.arange(6.0) * 10.0, speed, accel, slope, np.array([7.0]))
-    assert_array_equal(named, [0, 1, 2, 3, 4, 5])
-
-
-def test_what_only_comes_back_after_a_dip_is_no_gain():
-    information = np.array([1.0, 3.0, 0.5, 2.0, 4.0, 4.0, 1.0, 2.0])
-    # From the record of 3 to that of 4: raised by 1.5 and 2 in two windows, 1 in all.
-    expected = [1.0, 2.0, 0.0, 1.5 / 3.5, 2.0 / 3.5, 0.0, 0.0, 0.0]
-    assert_allclose(_net_gain(information), expected)
+def test_each_manoeuvre_has_its_minutes(tmp_path):
+    # Ten times up in a third gear for 20 s, down without brakes for 32 s, and 28 s in between.
+    up, down = np.arange(14.0, 22.0, 0.4 / RATE), np.arange(22.0, 14.0, -0.25 / RATE)
+    even = np.full(int(28.0 * RATE), 14.0)
+    gained = shares(written(tmp_path, [driven(np.tile(np.concatenate((up, down, even)), 10))]))
+    assert set(gained) <= {"acceleration", "slowing", "cruise"}
+    assert_allclose(
+        [gained[name][2] for name in ("acceleration", "slowing", "cruise")],
+        [200.0 / 60.0, 320.0 / 60.0, 280.0 / 60.0],
+        atol=0.5,
+    )
+    # The third gear is in from 12 m/s on; what follows within 5 s is after a shift.
+    rise = np.arange(9.0, 21.0, 0.4 / RATE)
+    shifted = shares(written(tmp_path, [driven(np.tile(np.concatenate((rise, rise[::-1])), 12))]))
+    assert shifted["after a shift"][2] == pytest.approx(12 * 5.0 / 60.0, abs=0.3)
 
 
 def loaded_on_the_way():
@@ -204,96 +202,95 @@ def loaded_on_the_way():
     return driven(speed, load=np.where(np.arange(speed.size) <= leg.size, 0.0, 400.0))
 
 
-def test_information_is_counted_for_each_load():
+def test_information_is_counted_for_each_load(tmp_path):
     w = loaded_on_the_way()
     assert len(w.segments) == 2
     assert w.mass == pytest.approx(MASS + 400.0, rel=0.02)
-    gained = information_gained(w.result)
-    first = gained.time < w.segments[1].start
-    assert gained.gain.sum() == pytest.approx(1.0)
-    assert 0.3 < gained.gain[first].sum() < 0.7
-
-
-def test_no_information_without_joint():
-    section = information_section(make_weighing())
-    assert not section.present
-    assert "only the method joint" in section.absent
-    lost = replace(make_weighing(), result=None, status=Status.MISSING_SIGNALS)
-    assert not information_section(lost).missing
+    (figure,) = over(written(tmp_path, [w]), "Time since start [min]", "± [kg]")
+    bars = [t for t in figure["data"] if t["type"] == "bar"]
+    minute = np.concatenate([numbers(t["x"]) for t in bars])
+    gain = np.concatenate([numbers(t["y"]) for t in bars])
+    assert gain.min() >= 0.0
+    assert gain.sum() == pytest.approx(100.0, abs=0.1)
+    assert 30.0 < gain[minute < w.segments[1].start / 60.0].sum() < 70.0
 
 
 @pytest.mark.parametrize("share", [0.0, 0.5])
-def test_wind_has_the_sign_of_the_weather(round_trip, share):
-    w = round_trip[share]
-    wind = wind_at_vehicle(w.result.slow_errors, w.drive)
-    assert_allclose(np.median(wind.north), 5.0 * np.cos(np.radians(320.0)), atol=1.0)
-    assert_allclose(np.median(wind.east), 5.0 * np.sin(np.radians(320.0)), atol=1.0)
-    # It comes from 320 degrees and goes to 140.
-    assert_allclose(np.degrees(np.median(wind.blows_to)), 140.0, atol=12.0)
-    panels = {p.title.split(",")[0]: p for p in slow_section(w).panels}
-    assert "Wind from the north-west" in panels
-    blew = next(p for title, p in panels.items() if title.startswith("How the wind blew"))
-    tails = [(a.ax, a.ay) for a in blew.figure.layout.annotations if a.showarrow]
+def test_wind_has_the_sign_of_the_weather(tmp_path, round_trip, share):
+    html = written(tmp_path, [round_trip[share]])
+    (figure,) = over(html, "Time since start [min]", "Wind at the vehicle [m/s]")
+    solid = [t for t in figure["data"] if "fill" not in t and t["line"].get("dash") != "dash"]
+    north, east = (np.median(numbers(t["y"])) for t in solid)
+    assert_allclose(north, 5.0 * np.cos(np.radians(320.0)), atol=1.0)
+    assert_allclose(east, 5.0 * np.sin(np.radians(320.0)), atol=1.0)
+    dashed = [t for t in figure["data"] if t["line"].get("dash") == "dash"]
+    assert_allclose([numbers(t["y"])[0] for t in dashed],
+                    [2.5 * np.cos(np.radians(320.0)), 2.5 * np.sin(np.radians(320.0))]
+                    if share else [], atol=1e-3)  # fmt: skip
+    maps = over(html, "East [km]")
+    blew = next(f for f in maps if any(t.get("name") == "wind" for t in f["data"]))
+    tails = [(a["ax"], a["ay"]) for a in blew["layout"]["annotations"] if a["showarrow"]]
     assert 3 < len(tails) <= 12
-    # Pixels count downwards: from the tail, right and down is south-east.
+    # It comes from 320 degrees and goes to 140. Pixels count downwards: from the tail, right and
+    # down is south-east.
     assert_allclose([np.degrees(np.arctan2(-x, y)) for x, y in tails], 140.0, atol=25.0)
-    assert max(np.hypot(x, y) for x, y in tails) == pytest.approx(LONGEST_ARROW)
-    names = {t.name for t in panels["Wind from the north-west"].figure.data}
-    assert ("reported, from east" in names) == (share > 0.0)
+    assert 30.0 < max(np.hypot(x, y) for x, y in tails) < 60.0
 
 
-def test_residual_is_highest_driving_against_the_wind(round_trip):
-    w = round_trip[0.0]
-    panel = next(p for p in residual_section(w, ()).panels if "heading" in p.title)
-    mean = next(t for t in panel.figure.data if t.name == WITH_SLOW)
-    crest = float(mean.x[np.argmax(mean.y)])
+def against(html, axis):
+    """Return the mean of the residual and what it is with slow forces, over such an axis."""
+    (figure,) = over(html, axis, "Residual [N]")
+    mean = next(t for t in figure["data"] if "error_y" in t)
+    slow = next(t for t in figure["data"] if t.get("line", {}).get("dash") == "dash")
+    return figure, mean, slow
+
+
+def test_residual_is_highest_driving_against_the_wind(tmp_path, round_trip):
+    _, left, slow = against(written(tmp_path, [round_trip[0.0]]), "Heading [deg]")
+    means = numbers(slow["y"])
+    crest = float(numbers(slow["x"])[np.argmax(means)])
     assert abs(crest - 320.0) <= 30.0
     # Drag of 30 m/s less that of 25 m/s, with the car's speed wandering around it.
     at_crest = 0.6 * 0.6 * ((25.0 + 5.0) ** 2 - 25.0**2)
-    assert_allclose(max(mean.y), at_crest, rtol=0.2)
+    assert_allclose(max(means), at_crest, rtol=0.2)
     # What the drive told of wind and slow forces is taken off: no crest is left.
-    left = next(t for t in panel.figure.data if t.name == "mean and spread")
-    assert max(np.abs(left.y)) < 0.1 * at_crest
+    assert max(np.abs(numbers(left["y"]))) < 0.1 * at_crest
 
 
-def test_a_car_that_goes_one_way_tells_no_wind():
-    w = driven(launches())
-    panels = slow_section(w).panels
-    assert any("does not show the wind" in p.title for p in panels)
-    assert any("no wind on the map" in p.absent for p in panels)
+def test_a_car_that_goes_one_way_tells_no_wind(tmp_path):
+    html = written(tmp_path, [driven(launches())])
+    assert not any(
+        a["showarrow"] for f in figures(html).values() for a in f["layout"].get("annotations", ())
+    )
 
 
-def test_bins_agree_with_a_loop():
-    rng = np.random.default_rng(2)
-    x, y = rng.uniform(-25.0, 25.0, 4000), rng.normal(3.0, 2.0, 4000)
-    centres, mean, std = binned(x, y, 10.0)
-    assert_allclose(centres, [-25.0, -15.0, -5.0, 5.0, 15.0, 25.0][: centres.size])
-    for centre, m, s in zip(centres, mean, std, strict=True):
-        inside = y[(x >= centre - 5.0) & (x < centre + 5.0)]
-        assert_allclose([m, s], [inside.mean(), inside.std(ddof=1)])
-    assert_array_equal(binned(np.repeat([1.0, 2.0], 20), np.ones(40), 1.0, True)[0], [1.0, 2.0])
+def test_means_of_the_residual_are_those_of_their_bins(tmp_path):
+    w = make_weighing(hours=1.0)
+    (figure,) = over(written(tmp_path, [w]), "Speed [km/h]", "Residual [N]")
+    mean = next(t for t in figure["data"] if "error_y" in t)
+    centres = numbers(mean["x"])
+    known = np.isfinite(w.result.residual)
+    speed, left = 3.6 * w.result.balance.table.speed[known], w.result.residual[known]
+    # At most 14 bins of a round width, and none of less than 10 samples or 0.2 % of them.
+    width = np.diff(centres)[0]
+    assert width in (5.0, 10.0)
+    assert np.ptp(speed) / width <= 15.0
+    for centre, m, s in zip(
+        centres, numbers(mean["y"]), numbers(mean["error_y"]["array"]), strict=True
+    ):
+        inside = left[(speed >= centre - 0.5 * width) & (speed < centre + 0.5 * width)]
+        assert inside.size >= max(10, 0.002 * left.size)
+        assert_allclose([m, s], [inside.mean(), inside.std(ddof=1)], rtol=1e-4)
 
 
-def test_rare_bins_have_no_mean():
-    x = np.concatenate((np.full(5000, 1.0), np.full(9, 11.0), np.full(10, 21.0), np.full(12, 31.0)))
-    assert_array_equal(binned(x, x, 10.0)[0], [5.0, 35.0])
-
-
-def test_bins_are_wide_enough_for_the_range():
-    assert bin_width(np.linspace(0.0, 60.0, 500), (5.0, 10.0, 20.0)) == 5.0
-    assert bin_width(np.linspace(0.0, 130.0, 500), (5.0, 10.0, 20.0)) == 10.0
-    assert bin_width(np.linspace(0.0, 9e5, 500), (5.0, 10.0, 20.0)) == 20.0
-
-
-def test_one_gear_and_no_heading_are_said():
+def test_one_gear_and_no_heading_leave_two_figures(tmp_path):
     w = make_weighing()
-    table = w.result.balance.table
-    balance = replace(w.result.balance, table=replace(table, gear=np.ones_like(table.gear)))
-    panels = residual_section(replace(w, result=replace(w.result, balance=balance)), ()).panels
-    told = " ".join(p.absent for p in panels)
-    assert "there is only one gear" in told
-    assert "the heading is not known" in told
-    assert sum(p.figure is not None for p in panels) == 2
+    known = w.result.balance.table
+    balance = replace(w.result.balance, table=replace(known, gear=np.ones_like(known.gear)))
+    for shown, count in ((w, 3), (replace(w, result=replace(w.result, balance=balance)), 2)):
+        drawn = figures(written(tmp_path, [shown])).values()
+        axes = [f["layout"].get("yaxis", {}).get("title", {}).get("text") for f in drawn]
+        assert axes.count("Residual [N]") == count
 
 
 def test_comparison_gives_what_each_method_gives():
@@ -301,9 +298,6 @@ def test_comparison_gives_what_each_method_gives():
     methods = compare(w)
     compared = [m for m in ESTIMATORS if ESTIMATORS[m].compared]
     assert [m.method for m in methods] == compared
-    styles = [method_style(method) for method in compared]
-    assert len(set(styles)) == len(styles)
-    assert method_style("of another package") not in styles
     for other in (m for m in methods if not ESTIMATORS[m.method].speed_alone):
         alone = ESTIMATORS[other.method].track(w.result.balance, w.vehicle)
         assert (other.result.mass, other.result.std) == (alone.mass, alone.std)
@@ -318,20 +312,25 @@ def test_joint_is_compared_without_an_accelerometer_too():
     assert by_joint.result is not None
 
 
-def test_methods_are_shown_with_their_intervals_or_why_not():
+def test_methods_are_shown_with_their_intervals_or_why_not(tmp_path):
     w = weighed_by_rls()
-    section = methods_section(w, compare(w), 1600.0)
-    rows = {row[0]: row[1:] for row in section.table.rows}
+    html = written(tmp_path, [w], comparisons=[compare(w)], truth={w.drive.name: 1600.0})
+    rows = table(html, "methods")
     low, high = w.interval(0.95)
-    assert rows["rls"][:2] == (f"{w.mass:.0f} kg", f"{low:.0f} to {high:.0f} kg")
+    assert rows["rls"][:2] == [f"{w.mass:.0f} kg", f"{low:.0f} to {high:.0f} kg"]
     assert rows["rls"][3] == f"{100.0 * (w.mass / 1600.0 - 1.0):+.1f} %".replace("-", "−")
     assert "vehicle_speed" in rows["speed-ekf"][-1]
-    masses = section.panels[0].figure
-    mark = next(t for t in masses.data if t.y == ("rls",))
-    assert rows["rls"][5] == "the answer"
-    assert_allclose([mark.x[0] - mark.error_x.arrayminus[0], mark.x[0] + mark.error_x.array[0]],
-                    [low, high])  # fmt: skip
-    assert "speed-ekf" not in {t.y[0] for t in masses.data}
+    (masses,) = over(html, "Mass [kg]")
+    marks = {t["y"][0]: t for t in masses["data"]}
+    assert "speed-ekf" not in marks
+    x, reach = numbers(marks["rls"]["x"])[0], marks["rls"]["error_x"]
+    ends = [x - numbers(reach["arrayminus"])[0], x + numbers(reach["array"])[0]]
+    assert_allclose(ends, [low, high], rtol=1e-6)
+    tracks = next(f for f in over(html, "Time since start [min]")
+                  if {"rls", "hybrid"} <= {t.get("name") for t in f["data"]})  # fmt: skip
+    styles = {t["name"]: (t["line"]["color"], t["line"].get("dash")) for t in tracks["data"]
+              if t.get("name") in marks}  # fmt: skip
+    assert len(set(styles.values())) == len(marks)
 
 
 def links_and_ids(html):
@@ -407,22 +406,25 @@ def test_disturbance_keeps_its_unit_and_band(tmp_path, round_trip):
         assert np.nanmedian(high - low) == pytest.approx(2 * 1.96 * np.median(std), rel=0.1)
 
 
-def test_a_band_is_one_closed_area_for_each_stretch_that_is_known():
+def test_a_band_is_one_closed_area_for_each_stretch_that_is_known(tmp_path):
     """A gap in the grade once drew one wedge across the whole plot."""
-    x = np.arange(8.0)
-    low = np.array([1.0, 2.0, np.nan, 3.0, 4.0, 5.0, np.nan, np.nan])
-    high = low + 10.0
-    high[5] = np.nan
-    figure = blank("x", "y")
-    band(figure, x, low, high, "95 % band")
-    (area,) = figure.data
-    assert area.fill == "toself"
-    gap = np.nan
-    assert_array_equal(area.x, [0.0, 1.0, 1.0, 0.0, gap, 3.0, 4.0, 4.0, 3.0])
-    assert_array_equal(area.y, [1.0, 2.0, 12.0, 11.0, gap, 3.0, 4.0, 14.0, 13.0])
-
-
-def test_a_band_of_nothing_is_empty():
-    figure = blank("x", "y")
-    band(figure, np.arange(3.0), np.full(3, np.nan), np.ones(3), "95 % band")
-    assert len(figure.data[0].x) == 0
+    w = make_weighing()
+    known = w.result.balance
+    hidden = (known.table.time > 600.0) & (known.table.time < 900.0)
+    grade = np.where(hidden, np.nan, known.motion.grade)
+    motion = replace(known.motion, grade=grade)
+    balance = replace(known, motion=motion, table=replace(known.table, grade=grade))
+    w = replace(w, result=replace(w.result, balance=balance))
+    road = next(f for f in over(written(tmp_path, [w]), "Distance [km]")
+                if any(t.get("fill") == "toself" for t in f["data"]))  # fmt: skip
+    area = next(t for t in road["data"] if t.get("fill") == "toself")
+    x, y = numbers(area["x"]), numbers(area["y"])
+    (gap,) = np.flatnonzero(np.isnan(x))
+    for side in (x[:gap], x[gap + 1 :]):
+        half = side.size // 2
+        assert_allclose(side[:half], side[half:][::-1])
+    # No width but there and back: the band is 1.96 standard deviations to each side.
+    half = gap // 2
+    width = y[:gap][half:][::-1] - y[:gap][:half]
+    assert_allclose(width, 2.0 * 1.96 * 0.4, rtol=0.02)
+    assert x[:gap].max() < x[gap + 1 :].min()

@@ -10,7 +10,7 @@ from tests.noted import error
 
 import weighbridge as wb
 from weighbridge import ConfigError, DriveError
-from weighbridge.fleet.table import rows
+from weighbridge.fleet.inputs import recordings
 from weighbridge.simulation import FleetSettings, plan_fleet
 from weighbridge.simulation.fleet import FAULTS, with_fault, with_torque_scale
 from weighbridge.simulation.fleet_files import _write_day, write_fleet
@@ -51,9 +51,9 @@ def test_drives_have_the_mass_of_the_truth_and_do_not_tell_it(small):
 
 
 def test_its_table_of_drives_is_one_that_fleet_reads(small):
-    found = list(rows(small / "drives.csv"))
+    found = list(recordings([str(small / "drives.csv")]))
     assert [(r.vehicle, r.kind) for r in found[::2]] == [("truck001", "truck"), ("van002", "van")]
-    assert all(wb.read_drive(r.files[0]).duration > 110.0 for r in found)
+    assert all(wb.read_drive(r.paths[0]).duration > 110.0 for r in found)
 
 
 def test_each_drive_begins_where_the_one_before_ended(small):

@@ -14,7 +14,6 @@ from weighbridge.constants import GRAVITY
 from weighbridge.estimators.judging import Evidence
 from weighbridge.messages import phrase
 from weighbridge.navigation.select import find_motion
-from weighbridge.navigation.speed import speed_motion
 from weighbridge.signals import QUANTITIES
 from weighbridge.vehicle.model import Driveline
 
@@ -34,7 +33,7 @@ def inner(motion):
 
 
 def test_acceleration_on_the_level():
-    motion = speed_motion(made(vehicle_speed=SPEED))
+    motion = find_motion(made(vehicle_speed=SPEED))
     k = inner(motion)
     assert motion.source == "speed"
     assert_allclose(motion.speed[k], np.interp(motion.time, TIME, SPEED)[k], atol=0.02)
@@ -46,7 +45,7 @@ def test_acceleration_on_the_level():
 
 def test_grade_from_height_over_distance():
     slope = 0.05
-    motion = speed_motion(made(vehicle_speed=SPEED, altitude=100.0 + slope * DISTANCE))
+    motion = find_motion(made(vehicle_speed=SPEED, altitude=100.0 + slope * DISTANCE))
     k = inner(motion)
     assert motion.source == "speed_grade"
     assert_allclose(motion.grade[k], np.arctan(slope), atol=0.002)
@@ -56,7 +55,7 @@ def test_grade_from_height_over_distance():
 
 
 def test_a_measured_grade_comes_before_height():
-    motion = speed_motion(
+    motion = find_motion(
         made(vehicle_speed=SPEED, grade=np.full(TIME.size, -0.03), altitude=0.1 * DISTANCE)
     )
     assert_allclose(motion.grade, -0.03)
@@ -65,7 +64,7 @@ def test_a_measured_grade_comes_before_height():
 def test_gaps_are_not_valid():
     keep = (TIME < 80.0) | (TIME > 95.0)
     gap = Drive("d", {"vehicle_speed": Signal("vehicle_speed", TIME[keep], SPEED[keep])})
-    motion = speed_motion(gap)
+    motion = find_motion(gap)
     assert not motion.valid[(motion.time > 82.0) & (motion.time < 93.0)].any()
     assert motion.valid[(motion.time < 79.0) | (motion.time > 96.0)].all()
 
@@ -74,7 +73,7 @@ def test_whole_kmh_once_a_second():
     time = np.arange(0.0, 300.0)
     true = 15.0 + 5.0 * np.sin(W * time)
     coarse = Signal("vehicle_speed", time, np.round(true * 3.6) / 3.6)
-    motion = speed_motion(Drive("d", {"vehicle_speed": coarse}))
+    motion = find_motion(Drive("d", {"vehicle_speed": coarse}))
     k = (motion.time > 10.0) & (motion.time < 290.0)
     error = motion.accel - 5.0 * W * np.cos(W * motion.time)
     assert float(np.std(error[k])) < 0.12
@@ -84,7 +83,7 @@ def test_whole_kmh_once_a_second():
 def test_too_little_speed(count):
     drive = Drive("d", {"vehicle_speed": Signal("vehicle_speed", TIME[:count], SPEED[:count])})
     with refused("speed.few", "speed.short"):
-        speed_motion(drive)
+        find_motion(drive)
 
 
 def test_known_scale_of_the_speed_is_taken_off():
@@ -144,7 +143,7 @@ def test_a_slow_cruise_lacks_starts_and_hills(short_drive, short_car):
     speed = slow.signals["vehicle_speed"]
     # A cruise at 90 km/h that a driver holds within 1 km/h.
     cruise = Signal(speed.name, speed.time, 25.0 + np.round(np.sin(speed.time / 20.0)) / 3.6)
-    motion = speed_motion(slow.with_signals(cruise).without("altitude"))
+    motion = find_motion(slow.with_signals(cruise).without("altitude"))
     evidence = Evidence(
         table=force_balance(slow, short_car, motion).table,
         used=np.ones(1, dtype=bool), phi=np.ones(1), mass=1.0, std=1.0, blocks=1, motion=motion,
@@ -154,4 +153,4 @@ def test_a_slow_cruise_lacks_starts_and_hills(short_drive, short_car):
 
 
 def test_a_fast_speed_is_no_cause():
-    assert speed_motion(made(vehicle_speed=SPEED)).recorded_speed.slow_text == ""
+    assert find_motion(made(vehicle_speed=SPEED)).recorded_speed.slow_text == ""

@@ -216,14 +216,12 @@ def test_what_cannot_be_set_is_one_sentence(given, said):
         ESTIMATORS[METHOD].settings_of(given)
 
 
-def test_stated_noise_is_not_searched(monkeypatch):
-    def refuse(*_, **__):
-        raise AssertionError
-
-    monkeypatch.setattr(speed_torque_ekf, "minimize", refuse)
+def test_stated_noise_is_what_the_interval_is_of():
     stated = {"speed_noise": 0.1, "accel_noise": 0.05, "slope_std": 0.01}
     found = wb.weigh(drive(), CAR, METHOD, settings=stated)
     assert found.mass == pytest.approx(MASS, rel=0.05)
+    noisier = wb.weigh(drive(), CAR, METHOD, settings=stated | {"speed_noise": 0.4})
+    assert noisier.result.bound_std > 1.2 * found.result.bound_std
 
 
 def reads_low(seed, mass, **more):
@@ -267,12 +265,9 @@ def test_without_a_calibration_both_jacobians_widen_the_interval():
     apart = abs(math.log(turned.result.mass / known.result.mass))
     assert apart > 0.01
     sheet = wb.weigh(noisy, CAR, METHOD)
-    share = speed_torque_ekf.BOUNDS_SHARE * apart
-    found = speed_torque_ekf.jacobian_std(
-        sheet.result.balance, CAR, speed_torque_ekf.SpeedTorqueSettings(), sheet.result.mass
-    )
-    assert found == pytest.approx(share, rel=0.05)
-    assert sheet.std / sheet.mass > share
+    # Half of what they are apart is one standard deviation at the least.
+    assert 0.5 * apart < sheet.std / sheet.mass
+    assert known.std / known.mass < sheet.std / sheet.mass
 
 
 def test_a_grade_that_is_less_sure_than_in_the_calibration_widens_the_interval(calibrated, third):
@@ -281,7 +276,7 @@ def test_a_grade_that_is_less_sure_than_in_the_calibration_widens_the_interval(c
     assert not any(p.id == "motion.grade_apart" for p in third.problems)
     assert any(p.id == "motion.grade_apart" for p in blind.problems)
     apart = 0.02 - calibrated.provenance.unmeasured_grade
-    assert blind.std / blind.mass > speed_torque_ekf.GRADE_STD * apart
+    assert blind.std / blind.mass > apart
     assert abs(blind.mass - (MASS + 150.0)) < 2.0 * blind.std
 
 

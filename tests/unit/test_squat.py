@@ -10,7 +10,7 @@ from scipy.ndimage import uniform_filter1d
 import weighbridge as wb
 from weighbridge import Drive, Signal
 from weighbridge.constants import GRAVITY
-from weighbridge.estimators import joint
+from weighbridge.estimators import ESTIMATORS
 from weighbridge.estimators.squat import (
     DRIVE_STD,
     SQUAT,
@@ -22,8 +22,8 @@ from weighbridge.estimators.squat import (
     squat_by_speed,
 )
 from weighbridge.navigation.inertial import inertial_motion
-from weighbridge.navigation.longitudinal import longitudinal_motion
 from weighbridge.navigation.motion import with_squat
+from weighbridge.navigation.select import find_motion
 from weighbridge.simulation import (
     MIDSIZE,
     Scenario,
@@ -33,6 +33,8 @@ from weighbridge.simulation import (
     simulate_car,
 )
 from weighbridge.vehicle.classes import VEHICLE_CLASSES
+
+joint = ESTIMATORS["joint"]
 
 K = 0.004
 """Pitch per specific force [rad per m/s^2]."""
@@ -154,7 +156,7 @@ def along(k, *, hills=0.02, seconds=900.0, swing=1.0, seed=4):
         "longitudinal_accel": Signal("longitudinal_accel", time, read),
         "vehicle_speed": Signal("vehicle_speed", time, speed),
     }
-    return longitudinal_motion(Drive("d", signals))
+    return find_motion(Drive("d", signals))
 
 
 @pytest.mark.parametrize("k", [0.0, 0.005])

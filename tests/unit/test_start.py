@@ -4,10 +4,7 @@ import numpy as np
 import pytest
 
 from weighbridge import DriveError, Signal
-from weighbridge.kernels.ins_model import P, Q, V
-from weighbridge.navigation.filter import run
-from weighbridge.navigation.identify.start import heading_of, turned
-from weighbridge.navigation.select import find_motion, identify_motion
+from weighbridge.navigation.select import find_motion
 
 FIXES = ("latitude", "longitude", "altitude")
 LENGTH = 200.0
@@ -56,24 +53,6 @@ def test_a_first_fix_that_is_far_off_does_not_turn_the_drive(short_drive):
     values[0] += 110.0 / 6.37e6
     motion = find_motion(cut.with_signals(Signal("latitude", latitude.time, values)))
     assert speed_error(motion, short_drive.truth) < 0.03
-
-
-def test_a_turned_start_gives_the_turned_drive(short_drive):
-    drive = short_drive.drive.between(0.0, 60.0).without(*FIXES, "gnss_speed", "gnss_course")
-    _, setup = identify_motion(drive)
-    from weighbridge.navigation.forward import _prepared
-    from weighbridge.navigation.sources import read_sources
-
-    block = _prepared(read_sources(drive), setup).block
-    pivot = np.array([30.0, -20.0, 1.0])
-    straight, _ = run(setup.start, block, setup)
-    bent, _ = run(turned(setup.start, 2.0, pivot), block, setup)
-    expected = turned(straight, 2.0, pivot)
-    for place in (slice(P, P + 3), slice(V, V + 3), slice(Q, Q + 4)):
-        np.testing.assert_allclose(bent.x[place], expected.x[place], rtol=1e-6, atol=1e-6)
-    np.testing.assert_allclose(bent.cov, expected.cov, rtol=1e-5, atol=1e-8)
-    turn = heading_of(bent.x[Q : Q + 4]) - heading_of(straight.x[Q : Q + 4])
-    assert np.angle(np.exp(1j * (turn - 2.0))) == pytest.approx(0.0, abs=1e-6)
 
 
 def of_another_place(drive):

@@ -14,11 +14,9 @@ from tests.unit.test_balance import CAR, CLOCK, MASS, STAMPS, accel_at, drive, m
 
 from weighbridge import ConfigError, Drive, DriveInfo, Signal, Status, Weighing, weigh
 from weighbridge.balance import force_balance
+from weighbridge.estimators import ESTIMATORS
 from weighbridge.estimators.judging import uncalibrated_std
-from weighbridge.estimators.rls import estimate
-from weighbridge.pipeline.notes import overload
 from weighbridge.pipeline.weighing import without_mass
-from weighbridge.results.row import unread_row
 from weighbridge.vehicle.model import Provenance
 
 TRACK_COLUMNS = [
@@ -37,7 +35,7 @@ FIELDS = {
 def weighing(vehicle=CAR, status=None, **changes):
     noise = np.random.default_rng(3).normal(scale=2.0, size=STAMPS.size)
     recorded = drive(torque=weighable() + noise)
-    track = estimate(force_balance(recorded, vehicle, motion(**changes)), vehicle)
+    track = ESTIMATORS["rls"].track(force_balance(recorded, vehicle, motion(**changes)), vehicle)
     return Weighing(
         drive=recorded,
         vehicle=vehicle,
@@ -71,10 +69,15 @@ def test_fields_of_the_json(good):
     assert "\n" not in good.to_json()
 
 
-def test_a_failed_drive_has_the_same_fields():
-    failed = unread_row("d", "car", "rls", noted("why")).to_dict()
-    assert set(failed) == FIELDS
-    assert failed["status"] in set(Status)
+def test_a_failed_drive_has_the_same_fields(weighbridge, tmp_path):
+    CAR.save(tmp_path / "car.toml")
+    names = [tmp_path / f"{k}.csv" for k in range(2)]
+    for name in names:
+        name.write_text("time_s,vehicle_speed_kmh\n")
+    ran = weighbridge("weigh", *names, "--vehicle", tmp_path / "car.toml", "--json", "-")
+    for failed in map(json.loads, ran.out.splitlines()):
+        assert set(failed) == FIELDS
+        assert failed["status"] in set(Status)
 
 
 @pytest.mark.parametrize("status", [Status.INCONSISTENT, Status.NOT_EXCITED])
@@ -230,14 +233,19 @@ def test_a_vehicle_that_was_not_calibrated_is_told():
     assert not told & {"vehicle.not_calibrated", "vehicle.uncalibrated", "vehicle.uncalibrated_std"}
 
 
-def test_overload_is_told(good):
-    mass, std = good.result.mass, good.result.std
-    for gross, word in ((mass - 3.0 * std, "surely"), (mass - 0.5 * std, "perhaps")):
-        (told,) = overload(replace(CAR, gross=gross), good.result)
-        assert told.id == "mass.above_permitted"
-        assert (told.values["sure"], told.values["gross"]) == (word, gross)
-    assert overload(replace(CAR, gross=mass + std), good.result) == ()
-    assert overload(CAR, good.result) == ()
+def test_overload_is_told(brief_drive, short_car):
+    def told(gross):
+        found = weigh(brief_drive, replace(short_car, tare=None, gross=gross)).problems
+        return [p for p in found if p.id == "mass.above_permitted"]
+
+    own = weigh(brief_drive, short_car)
+    for gross, word in (
+        (own.mass - 3.0 * own.std, "surely"),
+        (own.mass - 0.5 * own.std, "perhaps"),
+    ):
+        (problem,) = told(gross)
+        assert (problem.values["sure"], problem.values["gross"]) == (word, gross)
+    assert told(own.mass + own.std) == told(None) == []
 
 
 @pytest.mark.parametrize(
