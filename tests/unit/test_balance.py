@@ -9,8 +9,10 @@ from tests.noted import refused
 
 from weighbridge import Drive, DriveInfo, Signal, Vehicle
 from weighbridge.balance import Reason, force_balance
+from weighbridge.balance.gear_fit import share_on_gears
+from weighbridge.balance.instants import WIND_AT_VEHICLE
 from weighbridge.balance.law import drag_force, rotating_mass
-from weighbridge.estimators import ESTIMATORS
+from weighbridge.estimators.rls import estimate
 from weighbridge.navigation.motion import Motion
 from weighbridge.vehicle.model import Driveline, RoadLoad, Timing, TorqueModel
 
@@ -238,7 +240,7 @@ def test_delay_shifts_torque_against_motion():
 def test_headwind_from_the_north(heading, part):
     info = DriveInfo(wind_speed=8.0, wind_from=0.0)
     table = force_balance(drive(info=info), CAR, motion(heading=np.full(CLOCK.size, heading))).table
-    air = table.speed + part * 0.5 * 8.0
+    air = table.speed + part * WIND_AT_VEHICLE * 8.0
     assert_allclose(drag_force(table, CAR), 0.5 * table.air_density * 0.6 * air**2, rtol=1e-9)
 
 
@@ -264,7 +266,7 @@ def weighable():
 
 
 def test_weighing_takes_rising_speed_only():
-    track = ESTIMATORS["rls"].track(force_balance(drive(torque=weighable()), CAR, motion()), CAR)
+    track = estimate(force_balance(drive(torque=weighable()), CAR, motion()), CAR)
     assert track.mass == pytest.approx(MASS, rel=1e-3)
     falling = track.balance.table.accel <= 0.0
     assert np.isin(track.row_reason[falling], (Reason.NOT_ACCELERATING, Reason.OVERRUN)).all()
@@ -275,7 +277,16 @@ def test_an_outlier_is_a_bad_fit():
     rising = np.flatnonzero((accel_at(STAMPS) > 0.3) & (STAMPS > 300.0))[5]
     torque = weighable() + np.random.default_rng(1).normal(scale=0.5, size=STAMPS.size)
     torque[rising] += 400.0
-    track = ESTIMATORS["rls"].track(force_balance(drive(torque=torque), CAR, motion()), CAR)
+    track = estimate(force_balance(drive(torque=torque), CAR, motion()), CAR)
     # So sharp a fall behind it may be a foot that leaves the accelerator as well.
     assert track.row_reason[rising] in (Reason.BAD_FIT, Reason.OVERRUN)
     assert track.mass == pytest.approx(MASS, rel=0.01)
+
+
+def test_share_on_gears():
+    balance = force_balance(drive(), CAR, motion())
+    assert share_on_gears(balance, CAR) == 1.0
+    other = replace(CAR, driveline=Driveline(gearings=(17.0, 8.5)))
+    assert share_on_gears(force_balance(drive(), other, motion()), other) == 0.0
+    unknown = replace(CAR, driveline=Driveline())
+    assert share_on_gears(balance, unknown) is None

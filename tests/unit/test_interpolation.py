@@ -1,10 +1,12 @@
-"""Distances and means of windows against NumPy."""
+"""Interpolation and means of windows against NumPy."""
 
 from itertools import pairwise
 
 import numpy as np
+import pytest
 from numpy.testing import assert_array_equal
 
+from weighbridge import Signal
 from weighbridge.kernels.interpolation import (
     distance_to_nearest,
     longest_repeat,
@@ -12,6 +14,35 @@ from weighbridge.kernels.interpolation import (
     seen_windows,
     trapezoid_means,
 )
+from weighbridge.signals.interpolation import interpolate
+from weighbridge.signals.runs import runs_of
+
+
+@np.errstate(invalid="ignore")  # NumPy says nothing of infinite values, its scalars do.
+@pytest.mark.parametrize("seed", range(5))
+def test_interpolation_is_that_of_numpy_to_the_last_bit(seed):
+    rng = np.random.default_rng(seed)
+    time = np.sort(rng.uniform(0.0, 50.0, 300))
+    time[40:43] = time[40]
+    values = rng.normal(size=time.size)
+    values[100:103], values[200] = np.inf, np.nan
+    rising = np.sort(rng.uniform(-3.0, 53.0, 500))
+    for at in (
+        rising,
+        rising[::-1],
+        rng.permutation(np.concatenate([rising, time, [np.nan, np.inf, -np.inf]])),
+        (rising - np.array([[0.0], [1.0]]))[:, ::2],
+        np.array(7.5),
+        np.empty(0),
+    ):
+        expected = np.interp(at, time, values)
+        assert_array_equal(interpolate(at, time, values), expected)
+        assert interpolate(at, time, values).shape == np.shape(expected)
+        assert_array_equal(
+            interpolate(at, time, values, left=np.nan, right=1.0),
+            np.interp(at, time, values, left=np.nan, right=1.0),
+        )
+    assert_array_equal(interpolate(rising, time[:1], values[:1]), np.full(500, values[0]))
 
 
 def test_the_nearest_point_is_that_of_all():
@@ -63,8 +94,6 @@ def test_the_longest_repeat_is_that_of_the_runs_of_a_signal():
     rng = np.random.default_rng(9)
     time = np.cumsum(rng.uniform(0.01, 0.02, 2000))
     for levels in (1, 2, 5, 10**9):
-        values = rng.integers(levels, size=2000).astype(float)
-        begins = np.flatnonzero(np.diff(values, prepend=np.nan) != 0.0)
-        ends = np.append(begins[1:], values.size) - 1
-        assert longest_repeat(time, values) == np.max(time[ends] - time[begins])
+        signal = Signal("accel_x", time, rng.integers(levels, size=2000).astype(float))
+        assert longest_repeat(time, signal.values) == runs_of(signal).duration.max()
     assert longest_repeat(np.empty(0), np.empty(0)) == 0.0

@@ -8,8 +8,21 @@ import polars as pl
 from numpy.testing import assert_array_equal
 
 from weighbridge.io import parquet
+from weighbridge.navigation import aiding
+from weighbridge.navigation.aiding import resample
 from weighbridge.navigation.inertial import inertial_motion
 from weighbridge.simulation import make_scenario, simulate_car
+
+
+def test_lowpass_in_stretches_is_that_of_the_whole_to_the_last_bit(monkeypatch):
+    rng = np.random.default_rng(3)
+    time = np.sort(rng.uniform(0.0, 60.0, 12_000))
+    time = time[(time < 20.0) | (time > 31.0)]
+    axes = rng.normal(size=(3, time.size))
+    whole = resample(time, axes, 0.3, 0.05, 1190)
+    monkeypatch.setattr(aiding, "_AT_ONCE", 37)
+    assert_array_equal(resample(time, axes, 0.3, 0.05, 1190), whole)
+    assert np.isnan(whole).any()
 
 
 def bytes_per_sample(duration):

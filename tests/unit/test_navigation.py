@@ -15,7 +15,10 @@ from weighbridge import ConfigError, Drive, Signal, Vehicle
 from weighbridge.constants import GRAVITY
 from weighbridge.kernels.ins_model import P
 from weighbridge.kernels.lowpass import lowpass_resample
+from weighbridge.navigation.geodesy import LocalFrame
+from weighbridge.navigation.identify.timing import estimate_speed_delay
 from weighbridge.navigation.inertial import inertial_motion
+from weighbridge.navigation.rows import place_nodes
 from weighbridge.navigation.select import find_motion
 from weighbridge.navigation.settings import NavigationSettings
 from weighbridge.vehicle.model import Driveline, Mounting
@@ -300,6 +303,29 @@ def test_jitter_of_the_inertial_clock(hills):
     assert np.degrees(np.std(_error(m, truth, "grade"))) < 0.25
 
 
+def test_delay_of_the_speed_is_found():
+    rng = np.random.default_rng(2)
+    t = np.arange(0.0, 300.0, 0.05)
+    accel = 1.2 * np.sin(t / 3.0) + 0.5 * np.sin(t / 1.1)
+    speed = 15.0 + np.concatenate([[0.0], np.cumsum(0.5 * (accel[1:] + accel[:-1]) * 0.05)])
+    force = accel + 0.3 * np.sin(t / 40.0) + rng.normal(scale=0.1, size=t.size)
+    stamps = np.arange(3.0, 295.0, 0.25)
+    for delay in (-0.2, 0.0, 0.137, 0.5):
+        shown = np.round(3.6 * np.interp(stamps - delay, t, speed)) / 3.6
+        found, std = estimate_speed_delay(t, force, Signal("vehicle_speed", stamps, shown))
+        assert abs(found - delay) < max(4.0 * std, 0.01)
+        assert std < 0.03
+
+
+def test_delay_of_a_constant_speed_is_not_found():
+    t = np.arange(0.0, 100.0, 0.05)
+    stamps = np.arange(1.0, 99.0, 0.25)
+    steady = Signal("vehicle_speed", stamps, np.full(stamps.size, 20.0))
+    delay, std = estimate_speed_delay(t, 0.1 * np.sin(t), steady)
+    assert delay == 0.0
+    assert np.isinf(std)
+
+
 def test_lowpass_keeps_slow_and_stops_what_would_fold():
     rng = np.random.default_rng(1)
     t = np.sort(rng.uniform(0.0, 40.0, 8000))
@@ -329,6 +355,34 @@ def test_lowpass_response_on_an_even_clock():
         )  # fmt: skip
         gain = np.abs(np.mean((out[:, 0] + 1j * out[:, 1]) * np.exp(-2j * np.pi * hertz * grid)))
         assert low <= gain <= high, hertz
+
+
+def test_local_frame_both_ways():
+    frame = LocalFrame(0.9, -2.0, 35.0)
+    lat = np.array([0.9, 0.9001, 0.8995])
+    lon = np.array([-2.0, -2.0002, -1.9999])
+    alt = np.array([35.0, 80.0, 10.0])
+    ned = frame.to_ned(lat, lon, alt)
+    assert_allclose(ned[0], 0.0, atol=1e-9)
+    # one ten-thousandth of a radian of latitude is a ten-thousandth of the meridian's radius
+    a, e2 = 6378137.0, 6.69437999014e-3
+    radius = a * (1.0 - e2) / (1.0 - e2 * math.sin(0.9) ** 2) ** 1.5
+    assert abs(ned[1, 0] - 1e-4 * radius) < 1.0
+    back = frame.to_geodetic(ned)
+    for got, want in zip(back, (lat, lon, alt), strict=True):
+        assert_allclose(got, want, atol=1e-8, rtol=1e-9)
+
+
+def test_nodes_hold_each_fix_and_both_sides_of_a_gap():
+    time = np.concatenate([np.arange(0.0, 5.0, 0.01), np.arange(8.0, 12.0, 0.01)])
+    nodes = place_nodes(time, np.array([1.234, 9.876]), 20.0, 0.5)
+    chosen = time[nodes]
+    for instant in (1.234, 9.876):
+        assert np.abs(chosen - instant).min() <= 0.0051
+    assert 499 in nodes
+    assert 500 in nodes
+    assert np.all(np.diff(nodes) > 0)
+    assert np.diff(chosen[chosen < 4.9]).max() < 0.0501
 
 
 def test_settings_refuse_the_impossible():
