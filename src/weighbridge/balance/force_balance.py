@@ -165,18 +165,17 @@ def _wheel_speed(drive: Drive, motion: Motion, table: ForceTable) -> Floats | No
 
 
 def force_rows(
-    drive: Drive, vehicle: Vehicle, motion: Motion, delay: float, setup: ForceSetup | None
+    drive: Drive, vehicle: Vehicle, lagged: Motion, delay: float, setup: ForceSetup
 ) -> ForceTable:
     """Return the rows of `force_balance` without reasons and noise: enough to compare forces.
 
     Parameters
     ----------
-    drive, vehicle, motion, delay, setup : as of `force_balance`
+    drive, vehicle, delay, setup : as of `force_balance`
+    lagged : the motion, smoothed as the torque is
     """
     source = source_signal(drive, vehicle)
-    lagged = lagged_motion(motion, vehicle.timing.torque_lag)
-    engine_delay = setup.engine_delay if setup is not None else None
-    return _read(drive, vehicle, lagged, source, delay, engine_delay, setup).table
+    return _read(drive, vehicle, lagged, source, delay, setup.engine_delay, setup).table
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

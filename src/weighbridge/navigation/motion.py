@@ -8,6 +8,7 @@ from typing import Final, Literal
 import numpy as np
 
 from weighbridge.constants import GRAVITY
+from weighbridge.kernels.interpolation import rows_before
 from weighbridge.messages import Problem, phrase
 from weighbridge.signals import Bools, Floats, Ints, Signal
 from weighbridge.signals.robust import spread
@@ -177,7 +178,8 @@ class Motion:
 
 def row_before(motion: Motion, time: Floats) -> Ints:
     """Last row that is not after each instant (n,); the first where none is."""
-    return np.maximum(np.searchsorted(motion.time, time, side="right") - 1, 0)
+    found: Ints = rows_before(np.ascontiguousarray(time), motion.time)
+    return found
 
 
 def nearest_row(motion: Motion, time: Floats) -> Ints:
