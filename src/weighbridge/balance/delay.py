@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from weighbridge.balance.force_balance import force_balance, force_rows
+from weighbridge.balance.force_balance import force_rows, usable_rows
 from weighbridge.balance.instants import lagged_motion
 from weighbridge.balance.law import force_on_mass
 from weighbridge.balance.table import ForceBalance
@@ -222,9 +222,9 @@ def _misfit(
     setup = begun.setup
     assert setup is not None
     views = {begun.delay: begun.table}
-    for delay in map(float, delays):
-        views[delay] = force_balance(drive, vehicle, motion, delay=delay, setup=setup).table
     lagged = lagged_motion(motion, vehicle.timing.torque_lag)
+    for delay in map(float, delays):
+        views[delay] = usable_rows(drive, vehicle, motion, lagged, delay, setup)
     # Rows that come and go with the delay would make its misfit rough.
     common = np.logical_and.reduce(
         [table.usable & np.isfinite(table.traction_force) for table in views.values()]

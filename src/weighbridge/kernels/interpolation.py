@@ -208,6 +208,34 @@ def moved_changes(begins, ends, delay, time, integral, whole, width):
 
 
 @kernel
+def integral(time, values, level, stride):
+    """Integrate a signal less a level, by the trapezoidal rule.
+
+    Parameters
+    ----------
+    time, values : (n,) float64
+        n > 0.
+    level : float
+    stride : int
+
+    Returns
+    -------
+    (k,) float64
+        From the first sample to every so many, and to the last.
+    """
+    last = time.size - 1
+    found = np.zeros(last // stride + 1 + (last % stride > 0))
+    area = 0.0
+    for k in range(1, time.size):
+        before, here = values[k - 1] - level, values[k] - level
+        area += 0.5 * (here + before) * (time[k] - time[k - 1])
+        if k % stride == 0:
+            found[k // stride] = area
+    found[-1] = area
+    return found
+
+
+@kernel
 def trapezoid_means(edges, time, values):
     """Means of a signal over neighbouring windows, by the trapezoidal rule.
 
