@@ -14,6 +14,7 @@ from weighbridge import ConfigError, Drive, DriveInfo, Signal, Status, Weighing,
 from weighbridge.balance import ForceBalance, ForceTable, Reason
 from weighbridge.balance.instants import WIND_AT_VEHICLE
 from weighbridge.estimators import ESTIMATORS, joint
+from weighbridge.navigation.geodesy import LocalFrame
 from weighbridge.navigation.motion import Motion
 from weighbridge.report import write_report
 from weighbridge.report.information_section import (
@@ -91,8 +92,7 @@ def driven(
         heading=heading,
         distance=np.cumsum(speed) / RATE,
         altitude=nowhere,
-        latitude=0.9 + north / 6.37e6,
-        longitude=0.2 + east / (6.37e6 * np.cos(0.9)),
+        position=(LocalFrame(0.9, 0.2, 0.0), np.column_stack([north, east, np.zeros(n)])),
         valid=np.ones(n, dtype=bool),
         specific_force_std=0.03,
         grade_std=np.full(n, 0.002),
