@@ -19,6 +19,7 @@ from weighbridge.kernels.interpolation import (
     shares,
     trapezoid_means,
 )
+from weighbridge.kernels.shaking import widest_spread
 from weighbridge.signals.interpolation import interpolate
 from weighbridge.signals.runs import runs_of
 
@@ -126,3 +127,11 @@ def test_the_longest_repeat_is_that_of_the_runs_of_a_signal():
         signal = Signal("accel_x", time, rng.integers(levels, size=2000).astype(float))
         assert longest_repeat(time, signal.values) == runs_of(signal).duration.max()
     assert longest_repeat(np.empty(0), np.empty(0)) == 0.0
+
+
+@pytest.mark.parametrize("half", [1, 9])
+def test_the_widest_spread_is_that_of_windows_whose_ends_are_held(half):
+    values = np.random.default_rng(10).normal([0.0, 3.0, -9.8], size=(500, 3))
+    held = np.pad(values, ((half, half), (0, 0)), mode="edge")
+    windows = np.lib.stride_tricks.sliding_window_view(held, 2 * half + 1, axis=0)
+    assert_allclose(widest_spread(values, half), windows.std(axis=-1).max(axis=1), atol=1e-9)

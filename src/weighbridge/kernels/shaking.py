@@ -1,4 +1,4 @@
-"""How much an axis shakes beside its moving mean, block by block."""
+"""How much axes shake: block by block, and around each instant."""
 
 import numpy as np
 
@@ -46,3 +46,32 @@ def shaking(time, values, speed_time, speed, fast, width, start, block, count):
             samples[place] += 1.0
         total -= values[k - width + 1] - level
     return square, samples
+
+
+@kernel
+def widest_spread(values, half):
+    """Return the largest standard deviation of several axes around each instant (n,).
+
+    Parameters
+    ----------
+    values : (n, c) float64
+        n > 0.
+    half : int
+        Samples on either side; beyond an end its sample is held.
+    """
+    count, width = values.shape[0], 2 * half + 1
+    widest = np.zeros(count)
+    for c in range(values.shape[1]):
+        level, total, square = values[0, c], 0.0, 0.0
+        for k in range(-half, count + half):
+            here = values[min(max(k, 0), count - 1), c] - level
+            total += here
+            square += here * here
+            if k >= half:
+                mean = total / width
+                spread = np.sqrt(max(square / width - mean * mean, 0.0))
+                widest[k - half] = max(widest[k - half], spread)
+                gone = values[max(k - 2 * half, 0), c] - level
+                total -= gone
+                square -= gone * gone
+    return widest
