@@ -251,7 +251,7 @@ def joined(parts: list[Motion], last: int | None = None) -> Motion:
         for name in ("time", "speed", "accel", "specific_force", "grade", "pitch", "roll",
                      "heading", "distance", "altitude", "valid", "grade_std")
     }  # fmt: skip
-    return replace(parts[-1], position=None, **columns)
+    return replace(parts[-1], **columns)
 
 
 def forward_motion(drive: Drive, setup: Setup) -> Motion:

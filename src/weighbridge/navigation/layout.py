@@ -179,6 +179,7 @@ def smoothed_motion(found: Found, setup: Setup) -> Motion:
         squat_std=squat_std if shown or known else None,
         mounting=mounting,
         mounting_std=mounting_std,
+        position=None if setup.origin is None else (setup.origin, pose.position),
         notes=_notes(setup, shown or known),
     )
 
@@ -214,7 +215,7 @@ def _check_found(scale: float, nodes: Nodes, fixed: Bools, setup: Setup) -> None
 
 
 def laid_out(pose: Pose, setup: Setup, **rows: object) -> Motion:
-    """Complete a motion by what the pose shows alone: speed, distance, angles and place."""
+    """Complete a motion by what the pose shows alone: speed, distance, angles and height."""
     time = rows["time"]
     assert isinstance(time, np.ndarray)
     velocity, heading = pose.velocity, pose.heading
@@ -231,7 +232,6 @@ def laid_out(pose: Pose, setup: Setup, **rows: object) -> Motion:
         heading=nothing if frame is None else np.mod(heading, 2.0 * math.pi),
         distance=np.concatenate([[0.0], way]),
         altitude=frame.height(pose.position) if frame and setup.has_height else nothing,
-        position=(frame, pose.position) if frame else None,
         speed_delay=setup.speed_delay,
         **rows,  # type: ignore[arg-type]
     )

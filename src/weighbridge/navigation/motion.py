@@ -99,7 +99,7 @@ class Motion:
     distance : (n,) travelled [m]
     altitude : (n,) [m]; NaN where unknown
     position : a local frame, and where in it the vehicle was (n, 3), north, east, down [m]; None
-        where unknown, and of rows that were put together
+        where unknown, and of a pass forward
     valid : (n,) the sources were there; False in their gaps
     specific_force_std : noise level of ``specific_force``, of one sample [m/s^2]
     grade_std : (n,) standard deviation of ``grade`` as the filter sees it [rad]
