@@ -48,9 +48,7 @@ def without_smoothed(drive: Drive, vehicle: Vehicle | None = None) -> Drive:
     ----------
     drive, vehicle : as of `weighbridge.checks.correct_drive`
     """
-    heights = drive.has("altitude") or drive.has("grade")
-    trusted = set(IMU_SIGNALS) & set(drive.info.trusted)
-    if trusted or not (drive.has("vehicle_speed") and heights):
+    if not _dispensable(drive):
         return drive
     for found in check_smoothed(drive, vehicle):
         left_out = Problem.of(
@@ -58,6 +56,19 @@ def without_smoothed(drive: Drive, vehicle: Vehicle | None = None) -> Drive:
         )
         return drive.without(*IMU_SIGNALS).with_problems(left_out)
     return drive
+
+
+def _dispensable(drive: Drive) -> bool:
+    """Whether speed and heights weigh without the accelerometer, for which no person vouches."""
+    heights = drive.has("altitude") or drive.has("grade")
+    trusted = set(IMU_SIGNALS) & set(drive.info.trusted)
+    return drive.has("vehicle_speed") and heights and not trusted
+
+
+def check_needed(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
+    """Check as `check_smoothed` an accelerometer that `without_smoothed` does not look at."""
+    if not _dispensable(drive):
+        yield from check_smoothed(drive, vehicle)
 
 
 def check_smoothed(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
