@@ -86,8 +86,8 @@ def _not_another(found: Any, *given: Any) -> Any:
     return False, None
 
 
-def _not_smoothed(found: Any, drive: Any, *given: Any) -> Any:
-    return drive, (), None
+def _not_smoothed(found: Any, drive: Any, vehicle: Any, balance: Any) -> Any:
+    return drive, (), balance
 
 
 def _second(found: Any, drive: Any, vehicle: Any) -> Any:

@@ -593,7 +593,7 @@ def canedge_regressions(drives: list[tuple[str, wb.Drive]]) -> str:
     long = [(name, drive) for name, drive in drives if drive.duration > 500.0]
     motions = [find_motion(drive, car) for _, drive in long]
     delays = [
-        estimate_torque_delay(drive, car, motion)
+        estimate_torque_delay(drive, car, motion, force_balance(drive, car, motion, delay=0.0))
         for (_, drive), motion in zip(long, motions, strict=True)
     ]
     delay = float(np.nanmedian(delays))

@@ -53,8 +53,6 @@ def motion(**changes):
         heading=nothing,
         distance=np.cumsum(speed_at(CLOCK)) * 0.1,
         altitude=np.zeros(n),
-        latitude=nothing,
-        longitude=nothing,
         valid=np.ones(n, dtype=bool),
         specific_force_std=0.05,
         grade_std=np.full(n, 0.01),

@@ -60,7 +60,7 @@ def motion(braking=True, lag=0.0):
     return Motion(
         source="inertial", time=CLOCK, speed=np.full(CLOCK.size, 15.0), accel=accel,
         specific_force=accel, grade=zeros, pitch=zeros, roll=zeros, heading=nothing,
-        distance=15.0 * CLOCK, altitude=zeros, latitude=nothing, longitude=nothing,
+        distance=15.0 * CLOCK, altitude=zeros,
         valid=np.ones(CLOCK.size, dtype=bool), specific_force_std=0.05, grade_std=zeros + 0.01,
     )  # fmt: skip
 

@@ -4,16 +4,22 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from numpy.testing import assert_array_equal
+from numpy.testing import assert_allclose, assert_array_equal
+from scipy.integrate import cumulative_trapezoid
 
 from weighbridge import Signal
 from weighbridge.kernels.interpolation import (
     distance_to_nearest,
+    integral,
     longest_repeat,
+    mixed,
     moved_changes,
+    rows_before,
     seen_windows,
+    shares,
     trapezoid_means,
 )
+from weighbridge.kernels.shaking import widest_spread
 from weighbridge.signals.interpolation import interpolate
 from weighbridge.signals.runs import runs_of
 
@@ -54,6 +60,30 @@ def test_the_nearest_point_is_that_of_all():
         assert_array_equal(distance_to_nearest(at[order], time), expected[order])
     assert np.isnan(distance_to_nearest(np.array([np.nan]), time)).all()
     assert_array_equal(distance_to_nearest(at, time[:1]), np.abs(at - time[0]))
+
+
+def test_rows_are_found_and_mixed_but_across_a_silence():
+    rng = np.random.default_rng(5)
+    time, values = np.sort(rng.uniform(0.0, 50.0, 300)), rng.normal(size=300)
+    at = np.concatenate([np.sort(rng.uniform(-1.0, 51.0, 500)), time[::-7]])
+    row = rows_before(at, time)
+    assert_array_equal(row, np.maximum(np.searchsorted(time, at, side="right") - 1, 0))
+    share = shares(at, time, row, 0.5)
+    silent = np.diff(time)[np.minimum(row, 298)] >= 0.5
+    known = (at >= time[0]) & (at <= time[-1]) & ~silent
+    assert 0 < np.count_nonzero(silent) < np.count_nonzero(known)
+    assert_array_equal(np.isfinite(share), known)
+    expected = np.interp(at, time, values)[known]
+    assert_allclose(mixed(values, row, share)[known], expected, atol=1e-12)
+
+
+@pytest.mark.parametrize("stride", [1, 7, 13])
+def test_an_integral_is_that_by_trapezia_at_every_so_many_samples_and_the_last(stride):
+    rng = np.random.default_rng(8)
+    time, values = np.cumsum(rng.uniform(0.01, 0.02, 92)), rng.normal(size=92)
+    whole = cumulative_trapezoid(values - 0.3, time, initial=0.0)
+    expected = [*whole[::stride], *whole[-1:][: int(91 % stride > 0)]]
+    assert_allclose(integral(time, values, 0.3, stride), expected, atol=1e-12)
 
 
 def test_changes_moved_by_a_delay_are_those_of_two_interpolations():
@@ -97,3 +127,11 @@ def test_the_longest_repeat_is_that_of_the_runs_of_a_signal():
         signal = Signal("accel_x", time, rng.integers(levels, size=2000).astype(float))
         assert longest_repeat(time, signal.values) == runs_of(signal).duration.max()
     assert longest_repeat(np.empty(0), np.empty(0)) == 0.0
+
+
+@pytest.mark.parametrize("half", [1, 9])
+def test_the_widest_spread_is_that_of_windows_whose_ends_are_held(half):
+    values = np.random.default_rng(10).normal([0.0, 3.0, -9.8], size=(500, 3))
+    held = np.pad(values, ((half, half), (0, 0)), mode="edge")
+    windows = np.lib.stride_tricks.sliding_window_view(held, 2 * half + 1, axis=0)
+    assert_allclose(widest_spread(values, half), windows.std(axis=-1).max(axis=1), atol=1e-9)

@@ -144,8 +144,9 @@ def test_even_clock_and_shapes(hills_motion):
     assert_allclose(np.diff(m.time), 0.05, atol=1e-9)
     assert m.rate == pytest.approx(20.0)
     for name in ("speed", "accel", "specific_force", "grade", "pitch", "roll", "heading",
-                 "distance", "altitude", "latitude", "valid", "grade_std"):  # fmt: skip
+                 "distance", "altitude", "valid", "grade_std"):  # fmt: skip
         assert getattr(m, name).shape == m.time.shape
+    assert m.position[1].shape == (m.time.size, 3)
 
 
 @pytest.mark.parametrize(

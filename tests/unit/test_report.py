@@ -17,6 +17,7 @@ from tests.noted import error, noted
 from weighbridge import ConfigError, Drive, DriveInfo, Segment, Signal, Status, Vehicle, Weighing
 from weighbridge.balance import ForceBalance, ForceTable, Reason
 from weighbridge.estimators import MassTrack
+from weighbridge.navigation.geodesy import LocalFrame
 from weighbridge.navigation.motion import Motion
 from weighbridge.report import mass_figure, write_report
 from weighbridge.results.calibration import Calibration, DelaySearch, FittedRows
@@ -83,8 +84,9 @@ def make_weighing(
         heading=nowhere,
         distance=distance,
         altitude=20.0 - 24.0 * np.cos(distance / 800.0) if altitude else nowhere,
-        latitude=0.97 + distance / 6.4e6 if gnss else nowhere,
-        longitude=0.2 + 0.0 * distance if gnss else nowhere,
+        position=(LocalFrame(0.97, 0.2, 0.0), distance[:, None] * [1.0, 0.0, 0.0])
+        if gnss
+        else None,
         valid=np.ones(n, dtype=bool),
         specific_force_std=0.05,
         grade_std=np.full(n, 0.004),

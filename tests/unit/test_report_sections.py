@@ -23,6 +23,7 @@ from tests.unit.test_weighing import weighing as weighed_by_rls
 from weighbridge import ConfigError, Drive, DriveInfo, Signal, Weighing, compare
 from weighbridge.balance import ForceBalance, ForceTable, Reason
 from weighbridge.estimators import ESTIMATORS
+from weighbridge.navigation.geodesy import LocalFrame
 from weighbridge.navigation.motion import Motion
 from weighbridge.report import write_report
 from weighbridge.vehicle.model import Provenance
@@ -84,8 +85,7 @@ def driven(
         heading=heading,
         distance=np.cumsum(speed) / RATE,
         altitude=nowhere,
-        latitude=0.9 + north / 6.37e6,
-        longitude=0.2 + east / (6.37e6 * np.cos(0.9)),
+        position=(LocalFrame(0.9, 0.2, 0.0), np.column_stack([north, east, np.zeros(n)])),
         valid=np.ones(n, dtype=bool),
         specific_force_std=0.03,
         grade_std=np.full(n, 0.002),

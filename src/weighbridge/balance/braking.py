@@ -14,6 +14,7 @@ from weighbridge.balance.foot_setup import FootSetup, identify_foot, near
 from weighbridge.balance.instants import SLOWEST_GEARED, behind
 from weighbridge.balance.law import STANDARD_DENSITY, needed_force, rotating_mass
 from weighbridge.balance.table import ForceSetup, ForceTable
+from weighbridge.kernels.interpolation import rows_before
 from weighbridge.navigation.motion import BY_SPEED, Motion, row_before
 from weighbridge.signals import Bools, Drive, Floats, Signal
 from weighbridge.vehicle.air import dynamic_pressure
@@ -206,7 +207,8 @@ def _trailing(
     """
     if lag <= 0.0 or not slowed.any():
         return np.zeros(time.size, dtype=bool)
-    nearest = np.clip(np.searchsorted(time, motion.time), 0, time.size - 1)
+    before = rows_before(motion.time, time)
+    nearest = np.minimum(before + (time[before] < motion.time), time.size - 1)
     pressure = dynamic_pressure(STANDARD_DENSITY, motion.speed)
     needed, weight = needed_force(vehicle, motion.specific_force, pressure)
     dragged = np.minimum(np.nan_to_num(traction), 0.0)[nearest] if traction is not None else 0.0

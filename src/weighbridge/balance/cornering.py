@@ -37,7 +37,7 @@ def yaw_rate(time: Floats, heading: Floats, rate: float, ahead: float = math.inf
     index = np.arange(time.size)
     before, after = np.maximum(index - half, 0), np.minimum(index + seen, index.size - 1)
     turn = heading[after] - heading[before]
-    turn = np.mod(turn + np.pi, 2.0 * np.pi) - np.pi
+    turn -= 2.0 * np.pi * np.round(turn / (2.0 * np.pi))
     span = time[after] - time[before]
     return np.asarray(turn / np.where(span > 0.0, span, np.inf))
 

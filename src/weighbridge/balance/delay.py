@@ -7,9 +7,10 @@ from typing import Final
 
 import numpy as np
 
-from weighbridge.balance.force_balance import force_balance, force_rows
+from weighbridge.balance.force_balance import force_rows, usable_rows
+from weighbridge.balance.instants import lagged_motion
 from weighbridge.balance.law import force_on_mass
-from weighbridge.balance.table import ForceBalance, ForceTable
+from weighbridge.balance.table import ForceBalance
 from weighbridge.navigation.motion import Motion
 from weighbridge.signals import Drive, Floats
 from weighbridge.signals.correlation import correlation
@@ -137,7 +138,7 @@ def delay_std(misfit: Callable[[float], float], delay: float, rows: float) -> fl
 
 
 def estimate_torque_delay(
-    drive: Drive, vehicle: Vehicle, motion: Motion, begun: ForceBalance | None = None
+    drive: Drive, vehicle: Vehicle, motion: Motion, begun: ForceBalance
 ) -> float:
     """Find the delay at which traction explains specific force best [s]; NaN where none stands out.
 
@@ -147,24 +148,18 @@ def estimate_torque_delay(
     Parameters
     ----------
     drive, vehicle, motion
-    begun : balance of these at a delay, where it is worked out already
+    begun : balance of these at no delay
 
     Raises
     ------
     DriveError
         The drive lacks what the torque source needs.
     """
-    return best_delay(_misfit(drive, vehicle, motion, np.arange(EARLIEST, 0.41, 0.4), begun))
+    return best_delay(_misfit(drive, vehicle, motion, begun, np.array([EARLIEST, -EARLIEST])))
 
 
-def clock_shift(
-    drive: Drive,
-    vehicle: Vehicle,
-    motion: Motion,
-    known: float,
-    begun: ForceBalance | None = None,
-) -> float:
-    """Find by how much the torque is later than ``known`` [s]; 0 where it is not, or none is seen.
+def clock_shift(drive: Drive, vehicle: Vehicle, motion: Motion, begun: ForceBalance) -> float:
+    """Find how much later the torque is than in ``begun`` [s]; 0 where it is not, or none is seen.
 
     Less than `SAME_CLOCK` is no other clock. As much as 0.8 s is believed where it leaves half of
     the misfit or less, little where the misfit is lower there on both sides.
@@ -172,16 +167,16 @@ def clock_shift(
     Parameters
     ----------
     drive, vehicle, motion
-    known : lateness of the torque in the calibration [s]
-    begun : as of `estimate_torque_delay`
+    begun : balance of these at the lateness of the torque in the calibration
 
     Raises
     ------
     DriveError
         The drive lacks what the torque source needs.
     """
+    known = begun.delay
     shifts = np.array([-0.8, -_NEAR_BY, 0.0, _NEAR_BY, 0.8])
-    misfit = _misfit(drive, vehicle, motion, known + shifts, begun)
+    misfit = _misfit(drive, vehicle, motion, begun, known + shifts[shifts != 0.0])
     scores = np.array([misfit(float(known + shift)) for shift in shifts])
     if not np.isfinite(scores).all():
         return 0.0
@@ -217,18 +212,19 @@ def _misfit(
     drive: Drive,
     vehicle: Vehicle,
     motion: Motion,
+    begun: ForceBalance,
     delays: Floats,
-    begun: ForceBalance | None = None,
 ) -> Callable[[float], float]:
-    """One less the correlation of force and specific force, over rows usable at all ``delays``."""
-    views: dict[float, ForceTable] = {}
-    setup = None
-    for delay in sorted(map(float, delays), key=abs):
-        if setup is None and begun is not None and begun.delay == delay:
-            balance = begun
-        else:
-            balance = force_balance(drive, vehicle, motion, delay=delay, setup=setup)
-        views[delay], setup = balance.table, balance.setup
+    """One less the correlation of force and specific force.
+
+    Rows are those usable at all ``delays`` and at that of ``begun``.
+    """
+    setup = begun.setup
+    assert setup is not None
+    views = {begun.delay: begun.table}
+    lagged = lagged_motion(motion, vehicle.timing.torque_lag)
+    for delay in map(float, delays):
+        views[delay] = usable_rows(drive, vehicle, motion, lagged, delay, setup)
     # Rows that come and go with the delay would make its misfit rough.
     common = np.logical_and.reduce(
         [table.usable & np.isfinite(table.traction_force) for table in views.values()]
@@ -237,7 +233,7 @@ def _misfit(
     def misfit(delay: float) -> float:
         table = views.get(delay)
         if table is None:
-            table = force_rows(drive, vehicle, motion, delay, setup)
+            table = force_rows(drive, vehicle, lagged, delay, setup)
         rows = common & np.isfinite(table.traction_force) & np.isfinite(table.specific_force)
         if np.count_nonzero(rows) < 100:
             return float("nan")

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from weighbridge.balance.braking import Brakes, find_brakes, retarder_untold
 from weighbridge.balance.coarse import coarse_std
 from weighbridge.balance.cornering import cornering
-from weighbridge.balance.filled import filled, identify_fill
+from weighbridge.balance.filled import Fill, filled, identify_fill
 from weighbridge.balance.foot_setup import learn_dragged
 from weighbridge.balance.instants import (
     SLOWEST_GEARED,
@@ -115,17 +115,8 @@ def force_balance(
     if setup is not None:
         engine_delay = setup.engine_delay
     read = _read(drive, vehicle, lagged, source, delay, engine_delay, setup, since)
-    table = read.table
-    brakes = find_brakes(
-        drive, vehicle, motion, source, table,
-        known=read.instants.known, lag=lag,
-        signed=signed and source_of(vehicle).signed, setup=setup,
-    )  # fmt: skip
     fill = setup.fill if setup is not None else identify_fill(source)
-    without = filled(source, fill, forward=forward)
-    turning = cornering(motion, table.time, setup.ahead if setup is not None else math.inf)
-    reason = _reasons(read, brakes, without, turning)
-    table = replace(table, reason=reason)
+    brakes, table = _judged(drive, vehicle, motion, source, read, lag, signed, fill, setup)
     if setup is None:
         setup = ForceSetup(
             foot=brakes.foot,
@@ -145,7 +136,7 @@ def force_balance(
         brake_hidden=brakes.hidden,
         switch_dead=brakes.switch_dead,
         retarder_untold=retarder_untold(drive, vehicle),
-        coarse_std=coarse_std(source, reason == Reason.USED),
+        coarse_std=coarse_std(source, table.usable),
         air_std=setup.air_std,
         wheel_speed=None if forward else _wheel_speed(drive, motion, table),
         setup=setup,
@@ -165,18 +156,50 @@ def _wheel_speed(drive: Drive, motion: Motion, table: ForceTable) -> Floats | No
 
 
 def force_rows(
-    drive: Drive, vehicle: Vehicle, motion: Motion, delay: float, setup: ForceSetup | None
+    drive: Drive, vehicle: Vehicle, lagged: Motion, delay: float, setup: ForceSetup
 ) -> ForceTable:
     """Return the rows of `force_balance` without reasons and noise: enough to compare forces.
 
     Parameters
     ----------
-    drive, vehicle, motion, delay, setup : as of `force_balance`
+    drive, vehicle, delay, setup : as of `force_balance`
+    lagged : the motion, smoothed as the torque is
     """
     source = source_signal(drive, vehicle)
-    lagged = lagged_motion(motion, vehicle.timing.torque_lag)
-    engine_delay = setup.engine_delay if setup is not None else None
-    return _read(drive, vehicle, lagged, source, delay, engine_delay, setup).table
+    return _read(drive, vehicle, lagged, source, delay, setup.engine_delay, setup).table
+
+
+def usable_rows(
+    drive: Drive, vehicle: Vehicle, motion: Motion, lagged: Motion, delay: float, setup: ForceSetup
+) -> ForceTable:
+    """Return the rows as of `force_rows` with reasons; parameters likewise."""
+    source = source_signal(drive, vehicle)
+    read = _read(drive, vehicle, lagged, source, delay, setup.engine_delay, setup)
+    lag = vehicle.timing.torque_lag
+    return _judged(drive, vehicle, motion, source, read, lag, True, setup.fill, setup)[1]
+
+
+def _judged(
+    drive: Drive,
+    vehicle: Vehicle,
+    motion: Motion,
+    source: Signal,
+    read: _Read,
+    lag: float,
+    signed: bool,
+    fill: Fill | None,
+    setup: ForceSetup | None,
+) -> tuple[Brakes, ForceTable]:
+    """Where brakes may work, and the rows with the reasons why they are not used."""
+    table = read.table
+    brakes = find_brakes(
+        drive, vehicle, motion, source, table,
+        known=read.instants.known, lag=lag,
+        signed=signed and source_of(vehicle).signed, setup=setup,
+    )  # fmt: skip
+    without = filled(source, fill, forward=setup is not None and setup.foot.forward)
+    turning = cornering(motion, table.time, setup.ahead if setup is not None else math.inf)
+    return brakes, replace(table, reason=_reasons(read, brakes, without, turning))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -11,6 +11,7 @@ from typing import Any, Final
 import numpy as np
 
 from weighbridge.kernels.first_order import even_lag
+from weighbridge.kernels.interpolation import mixed, shares
 from weighbridge.navigation.motion import Motion, nearest_row, row_before
 from weighbridge.signals import Bools, Drive, Floats, Ints, Signal
 from weighbridge.signals.runs import marked_runs
@@ -116,17 +117,15 @@ def behind(values: Floats, rate: float, lag: float, start: float | None = None) 
 
 def interpolate_motion(motion: Motion, time: Floats) -> dict[str, Floats]:
     """Interpolate the motion to the instants ``time``; NaN outside."""
-    index = np.minimum(row_before(motion, time), motion.time.size - 2)
-    before, after = motion.time[index], motion.time[index + 1]
-    inside = (time >= before) & (time <= after) & ((after - before) * motion.rate < BREAK)
-    part = np.clip((time - before) / (after - before), 0.0, 1.0)
-    rows: dict[str, Floats] = {}
-    for name in ("speed", "accel", "specific_force", "grade", "pitch", "altitude", "valid"):
-        values = np.asarray(getattr(motion, name), dtype=np.float64)
-        mixed = values[index] + part * (values[index + 1] - values[index])
-        rows[name] = np.where(inside, mixed, np.nan)
-    rows["valid"] = np.where(inside, rows["valid"], 0.0)
-    rows["heading"] = np.where(inside, motion.heading[nearest_row(motion, time)], np.nan)
+    row = row_before(motion, time)
+    share = shares(time, motion.time, row, BREAK / motion.rate)
+    rows: dict[str, Floats] = {
+        name: mixed(np.asarray(getattr(motion, name), dtype=np.float64), row, share)
+        for name in ("speed", "accel", "specific_force", "grade", "pitch", "altitude", "valid")
+    }
+    outside = np.isnan(share)
+    rows["valid"][outside] = 0.0
+    rows["heading"] = np.where(outside, np.nan, motion.heading[nearest_row(motion, time)])
     return rows
 
 

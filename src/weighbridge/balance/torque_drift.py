@@ -105,31 +105,30 @@ def _best(force: Floats, moved: Floats) -> float:
 
 
 def smoothed_steps(
-    drive: Drive, vehicle: Vehicle, motion: Motion, delay: float
-) -> tuple[Drive, tuple[Problem, ...], ForceBalance | None]:
+    drive: Drive, vehicle: Vehicle, balance: ForceBalance
+) -> tuple[Drive, tuple[Problem, ...], ForceBalance]:
     """Move the stamps of a torque that drifts, so that it stays as late as it began.
 
     Parameters
     ----------
-    drive, vehicle, motion
-    delay : of the torque, roughly [s]
+    drive, vehicle
+    balance : of these, roughly at the delay of the torque
 
     Returns
     -------
     drive : as it was where nothing drifts
     notes : what was moved
-    balance : of that drive and delay, for whoever needs it next; None where it was not worked out
+    balance : of that drive, at the same delay
 
     Raises
     ------
     DriveError
         The lag wanders in no even way.
     """
-    source = source_of(vehicle)
+    source, motion = source_of(vehicle), balance.motion
     if motion.source in BY_SPEED or drive.info.trusted or source.combined is not None:
-        return drive, (), None
+        return drive, (), balance
     carrier = source.carrier(drive)
-    balance = force_balance(drive, vehicle, motion, delay=delay)
     before = force_lags(balance.table, vehicle, motion)
     slope, scatter = _line(before)
     reach = float(np.ptp(before.time)) if before.time.size else 0.0
@@ -140,7 +139,7 @@ def smoothed_steps(
     moved = carrier.time - slope * (carrier.time - before.time[0])
     rising = np.concatenate(([True], np.diff(np.maximum.accumulate(moved)) > 0.0))
     corrected = drive.with_signals(Signal(carrier.name, moved[rising], carrier.values[rising]))
-    balance = force_balance(corrected, vehicle, motion, delay=delay)
+    balance = force_balance(corrected, vehicle, motion, delay=balance.delay)
     after = force_lags(balance.table, vehicle, motion)
     if after.lag.size >= FEWEST_PARTS and np.ptp(median_of_three(after.lag)) > WANDERS:
         raise _wanders(drive, carrier, before)

@@ -25,7 +25,7 @@ from weighbridge.checks.frozen_imu import check_frozen, check_limit
 from weighbridge.checks.inertial import check_imu
 from weighbridge.checks.ranges import check_range, within_ranges, without_strays
 from weighbridge.checks.second_signals import check_reading
-from weighbridge.checks.smoothed_imu import check_smoothed, without_smoothed
+from weighbridge.checks.smoothed_imu import check_needed, without_smoothed
 from weighbridge.checks.speed import check_scales
 from weighbridge.checks.spikes import without_spikes
 from weighbridge.checks.travel import check_standstill
@@ -47,7 +47,7 @@ _CHECKS: Final[tuple[_Check, ...]] = (
     check_stuck,
     check_frozen,
     check_limit,
-    check_smoothed,
+    check_needed,
     check_load,
     check_retarder,
     check_torque_sign,

@@ -8,6 +8,7 @@ import numpy as np
 
 from weighbridge.signals import Bools, Drive, Floats, Problem, Signal
 from weighbridge.signals.catalogue import IMU_SIGNALS
+from weighbridge.signals.interpolation import interpolate
 from weighbridge.signals.robust import resolution
 
 COARSEST_CUT: Final = 0.12
@@ -60,7 +61,7 @@ def _moving(time: Floats, speed: Signal | None) -> Bools:
     """Instants (n,) at which an axis may not rest at zero; all of them without a speed."""
     if speed is None or len(speed) < 2:
         return np.ones(time.size, dtype=bool)
-    return np.asarray(np.interp(time, speed.time, np.abs(speed.values)) > MOVES)
+    return np.asarray(interpolate(time, speed.time, np.abs(speed.values)) > MOVES)
 
 
 def _cut(values: Floats, step: float) -> bool:

@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from weighbridge.constants import SAMPLES_AT_ONCE
+from weighbridge.kernels.shaking import shaking
 from weighbridge.navigation.frozen import without_frozen
 from weighbridge.signals import Drive, Floats, Problem, Signal
 from weighbridge.signals.catalogue import IMU_SIGNALS
@@ -48,9 +48,7 @@ def without_smoothed(drive: Drive, vehicle: Vehicle | None = None) -> Drive:
     ----------
     drive, vehicle : as of `weighbridge.checks.correct_drive`
     """
-    heights = drive.has("altitude") or drive.has("grade")
-    trusted = set(IMU_SIGNALS) & set(drive.info.trusted)
-    if trusted or not (drive.has("vehicle_speed") and heights):
+    if not _dispensable(drive):
         return drive
     for found in check_smoothed(drive, vehicle):
         left_out = Problem.of(
@@ -58,6 +56,19 @@ def without_smoothed(drive: Drive, vehicle: Vehicle | None = None) -> Drive:
         )
         return drive.without(*IMU_SIGNALS).with_problems(left_out)
     return drive
+
+
+def _dispensable(drive: Drive) -> bool:
+    """Whether speed and heights weigh without the accelerometer, for which no person vouches."""
+    heights = drive.has("altitude") or drive.has("grade")
+    trusted = set(IMU_SIGNALS) & set(drive.info.trusted)
+    return drive.has("vehicle_speed") and heights and not trusted
+
+
+def check_needed(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
+    """Check as `check_smoothed` an accelerometer that `without_smoothed` does not look at."""
+    if not _dispensable(drive):
+        yield from check_smoothed(drive, vehicle)
 
 
 def check_smoothed(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
@@ -70,11 +81,11 @@ def check_smoothed(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
     if max(s.period for s in axes) > SLOWEST:
         return
     start, count = drive.start, int((drive.end - drive.start) / BLOCK) + 1
-    shaking = np.zeros(count)
+    size = np.zeros(count)
     for axis in axes:
-        shaking = np.fmax(shaking, _shaking(axis, speed, start, count))
-    driven = shaking > MADE
-    quiet = driven & (shaking < QUIET)
+        size = np.fmax(size, _shaking(axis, speed, start, count))
+    driven = size > MADE
+    quiet = driven & (size < QUIET)
     if not quiet.any() or np.count_nonzero(quiet) < max(2.0, PART * np.count_nonzero(driven)):
         return
     first, last = np.flatnonzero(quiet)[[0, -1]]
@@ -85,7 +96,7 @@ def check_smoothed(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
         serious=True,
         start=start + BLOCK * first,
         end=end,
-        shaking=float(np.median(shaking[quiet])),
+        shaking=float(np.median(size[quiet])),
         within=SECOND,
         span=span(round(start + BLOCK * first), round(end)),
     )
@@ -96,17 +107,8 @@ def _shaking(axis: Signal, speed: Signal, start: float, count: int) -> Floats:
     long = max(2, round(SECOND / axis.period))
     if len(axis) <= 2 * long:
         return np.zeros(count)
-    square, samples = np.zeros(count), np.zeros(count)
-    fast = np.abs(speed.values)
-    for first in range(0, len(axis) - long + 1, SAMPLES_AT_ONCE):
-        values = axis.values[first : first + SAMPLES_AT_ONCE + long - 1]
-        total = np.concatenate(([0.0], np.cumsum(values - values[0])))
-        mean = (total[long:] - total[:-long]) / long + values[0]
-        middle = slice(long // 2, long // 2 + mean.size)
-        time, beside = axis.time[first:][middle], values[middle] - mean
-        moving = np.interp(time, speed.time, fast) > FAST
-        block = ((time[moving] - start) / BLOCK).astype(np.int64)
-        square += np.bincount(block, beside[moving] ** 2, minlength=count)
-        samples += np.bincount(block, minlength=count)
+    square, samples = shaking(
+        axis.time, axis.values, speed.time, np.abs(speed.values), FAST, long, start, BLOCK, count
+    )
     enough = samples * axis.period > 0.3 * BLOCK
     return np.asarray(np.sqrt(np.where(enough, square / np.maximum(samples, 1), 0.0)))

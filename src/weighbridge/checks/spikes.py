@@ -104,7 +104,7 @@ def spikes(time: Floats, values: Floats, rate: float, jump: float) -> Bools:
     for length in range(1, LONGEST + 1):
         if values.size < length + 2:
             break
-        first = np.arange(1, values.size - length)
+        first = np.flatnonzero(np.abs(np.diff(values[: values.size - length])) > jump) + 1
         last = first + length - 1
         before, after = values[first - 1], values[last + 1]
         inside = np.stack([values[first + k] for k in range(length)])

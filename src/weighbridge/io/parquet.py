@@ -43,9 +43,10 @@ def read_parquet(path: Path) -> RawTable:
                     for k, there in enumerate(kinds)
                     if there
                 }
-                table = table if whole is None else whole.lazy()
-                others = [k for k, there in enumerate(kinds) if not there]
-                frame = table.select([pl.col(names[k]).alias(str(k)) for k in others]).collect()
+                others = [
+                    pl.col(names[k]).alias(str(k)) for k, there in enumerate(kinds) if not there
+                ]
+                frame = table.select(others).collect() if whole is None else whole.select(others)
     except (*PARSE_ERRORS, OSError) as e:
         raise DriveError(
             f"{path} is not a readable Parquet file ({first_line(e)}); "

@@ -83,6 +83,65 @@ def interpolate(at, time, values, left, right):
 
 
 @kernel
+def rows_before(at, time):
+    """Return the last row that is not after each instant (m,) int64; the first where none is.
+
+    Parameters
+    ----------
+    at : (m,) float64
+        In any order; fast where they rise.
+    time : (n,) float64
+        Of the rows, n > 0; rising.
+    """
+    found = np.zeros(at.size, dtype=np.int64)
+    last = time.size - 1
+    j = 0
+    for k in range(at.size):
+        if at[k] >= time[0]:
+            j = _place(at[k], time, j) if at[k] < time[last] else last
+            found[k] = j
+    return found
+
+
+@kernel
+def shares(at, time, row, longest):
+    """Return how far instants lie from a row to the next [-].
+
+    Parameters
+    ----------
+    at : (m,) float64
+    time : (n,) float64
+        Of the rows, n > 1; rising.
+    row : (m,) int64
+        Of `rows_before`.
+    longest : float
+        Rows further apart have a silence between them.
+
+    Returns
+    -------
+    (m,) float64
+        In [0, 1]; NaN outside of the rows, and in a silence.
+    """
+    found = np.empty(at.size)
+    for k in range(at.size):
+        i = min(row[k], time.size - 2)
+        step = time[i + 1] - time[i]
+        inside = time[i] <= at[k] <= time[i + 1] and step < longest
+        found[k] = (at[k] - time[i]) / step if inside else np.nan
+    return found
+
+
+@kernel
+def mixed(values, row, share):
+    """Mix values (n,) of rows and of those after them by `shares`: (m,) float64."""
+    found = np.empty(row.size)
+    for k in range(row.size):
+        i = min(row[k], values.size - 2)
+        found[k] = values[i] + share[k] * (values[i + 1] - values[i])
+    return found
+
+
+@kernel
 def distance_to_nearest(at, time):
     """Return how far the nearest point is (m,).
 
@@ -145,6 +204,34 @@ def moved_changes(begins, ends, delay, time, integral, whole, width):
         if whole[k]:
             found[at] = changes[k] - (total[k + width] - total[k]) / width
             at += 1
+    return found
+
+
+@kernel
+def integral(time, values, level, stride):
+    """Integrate a signal less a level, by the trapezoidal rule.
+
+    Parameters
+    ----------
+    time, values : (n,) float64
+        n > 0.
+    level : float
+    stride : int
+
+    Returns
+    -------
+    (k,) float64
+        From the first sample to every so many, and to the last.
+    """
+    last = time.size - 1
+    found = np.zeros(last // stride + 1 + (last % stride > 0))
+    area = 0.0
+    for k in range(1, time.size):
+        before, here = values[k - 1] - level, values[k] - level
+        area += 0.5 * (here + before) * (time[k] - time[k - 1])
+        if k % stride == 0:
+            found[k // stride] = area
+    found[-1] = area
     return found
 
 

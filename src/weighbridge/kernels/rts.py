@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from weighbridge.kernels._jit import kernel
+from weighbridge.kernels._jit import inlined_kernel, kernel
 
 
-@kernel
+@inlined_kernel
 def _product(a, b, out):
     """Matrix product of small matrices, without a call of a library."""
     for i in range(a.shape[0]):
@@ -16,25 +16,34 @@ def _product(a, b, out):
             out[i, j] = total
 
 
-@kernel
-def _predict(transition, process_cov, x, cov, work):
-    """Take state and covariance one row further, in place."""
+@inlined_kernel
+def _predict(transition, process_cov, i, x, cov, work):
+    """Take state and covariance one row further, to row ``i``, in place."""
     k = x.size
-    moved = work[2, 0]
-    for i in range(k):
+    for a in range(k):
         total = 0.0
         for m in range(k):
-            total += transition[i, m] * x[m]
-        moved[i] = total
-    x[:] = moved
-    _product(transition, cov, work[0])
-    _product(work[0], transition.T, work[1])
-    for i in range(k):
-        for j in range(k):
-            cov[i, j] = 0.5 * (work[1, i, j] + work[1, j, i]) + process_cov[i, j]
+            total += transition[i, a, m] * x[m]
+        work[2, 0, a] = total
+    for a in range(k):
+        x[a] = work[2, 0, a]
+        for b in range(k):
+            total = 0.0
+            for m in range(k):
+                total += transition[i, a, m] * cov[m, b]
+            work[0, a, b] = total
+    for a in range(k):
+        for b in range(k):
+            total = 0.0
+            for m in range(k):
+                total += work[0, a, m] * transition[i, b, m]
+            work[1, a, b] = total
+    for a in range(k):
+        for b in range(k):
+            cov[a, b] = 0.5 * (work[1, a, b] + work[1, b, a]) + process_cov[i, a, b]
 
 
-@kernel
+@inlined_kernel
 def _spread(cov, row, variance, gain):
     """Variance of the innovation; ``gain`` becomes the covariance with the measurement."""
     total = variance
@@ -46,7 +55,7 @@ def _spread(cov, row, variance, gain):
     return total
 
 
-@kernel
+@inlined_kernel
 def _error(row, x, z):
     total = z
     for i in range(row.size):
@@ -54,12 +63,13 @@ def _error(row, x, z):
     return total
 
 
-@kernel
+@inlined_kernel
 def _update(x, cov, gain, error, spread):
+    inverse = 1.0 / spread
     for i in range(x.size):
-        x[i] += gain[i] * (error / spread)
+        x[i] += gain[i] * (error * inverse)
         for j in range(x.size):
-            cov[i, j] -= gain[i] * gain[j] / spread
+            cov[i, j] -= gain[i] * gain[j] * inverse
 
 
 @kernel
@@ -83,7 +93,7 @@ def log_likelihood(transition, process_cov, row, z, variance, x0, cov0):
     total = 0.0
     for i in range(z.size):
         if i > 0:
-            _predict(transition[i], process_cov[i], x, cov, work)
+            _predict(transition, process_cov, i, x, cov, work)
         if np.isfinite(z[i]):
             spread = _spread(cov, row, variance[i], gain)
             error = _error(row, x, z[i])
@@ -112,7 +122,7 @@ def smooth(transition, process_cov, row, z, variance, x0, cov0):
     x, cov, work = x0.copy(), cov0.copy(), np.empty((3, k, k))
     for i in range(n):
         if i > 0:
-            _predict(transition[i], process_cov[i], x, cov, work)
+            _predict(transition, process_cov, i, x, cov, work)
         # What is kept is from before the row is measured.
         mean[i], covs[i] = x, cov
         if np.isfinite(z[i]):

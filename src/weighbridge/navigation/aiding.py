@@ -15,6 +15,7 @@ from weighbridge.navigation.frozen import without_frozen
 from weighbridge.navigation.geodesy import LocalFrame
 from weighbridge.signals import Bools, Drive, Floats, Signal
 from weighbridge.signals.catalogue import IMU_SIGNALS
+from weighbridge.signals.interpolation import interpolate
 
 _FEWEST = 50
 """Fewer inertial samples show nothing."""
@@ -110,7 +111,7 @@ def read_imu(drive: Drive) -> Imu:
     speed = drive.speed
     moving = np.ones(time.size, dtype=bool)
     if speed is not None and len(speed):
-        moving = np.interp(time, speed.time, speed.values) > _MOVES
+        moving = interpolate(time, speed.time, speed.values) > _MOVES
     usual = signals[0].period if whole else float(np.median(np.diff(time)))
     imu = Imu(time, accel, gyro, usual)
     if imu.period > _SLOWEST:

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft
 from scipy.ndimage import uniform_filter1d
 
-from weighbridge.constants import SAMPLES_AT_ONCE
+from weighbridge.kernels.interpolation import integral
 from weighbridge.signals import Bools, Floats, Signal
 from weighbridge.signals.interpolation import interpolate
 from weighbridge.signals.robust import resolution
@@ -266,21 +266,11 @@ def _every(y: Floats, stride: int) -> Floats:
 
 
 def _integral(s: Signal, stride: int) -> Floats:
-    """Integral of a signal at every so many samples, and at the last, a part at a time."""
+    """Integral of a signal at every so many samples, and at the last."""
     # Less gravity, so that the sum stays small.
-    level = np.median(s.values[:: max(1, len(s) // 1000)])
-    found, area = [np.zeros(1)], 0.0
-    for first in range(0, len(s) - 1, SAMPLES_AT_ONCE):
-        here = slice(first, first + SAMPLES_AT_ONCE + 1)
-        values = s.values[here] - level
-        grown = 0.5 * (values[1:] + values[:-1]) * np.diff(s.time[here])
-        grown[0] += area
-        sums = np.cumsum(grown)
-        area = sums[-1]
-        found.append(sums[-(first + 1) % stride :: stride].copy())
-    if (len(s) - 1) % stride:
-        found.append(np.array([area]))
-    return np.concatenate(found)
+    level = float(np.median(s.values[:: max(1, len(s) // 1000)]))
+    found: Floats = integral(s.time, s.values, level, stride)
+    return found
 
 
 def _change(time: Floats, y: Floats, grid: Floats) -> Floats:

@@ -8,7 +8,7 @@ import numpy as np
 
 from weighbridge.constants import GRAVITY
 from weighbridge.navigation.axes import Axes
-from weighbridge.signals import Bools, Floats
+from weighbridge.signals import Bools, Floats, Ints
 from weighbridge.signals.robust import spread
 
 _LEAST_FORCE, _MOST_FORCE = 2.0, 50.0
@@ -22,6 +22,9 @@ _LEAST_SPIKE: Final = (4.0, 1.0)
 
 _ZEROS: Final = 0.002
 """A larger part of zeros in motion is no chance [-],"""
+
+_ENOUGH: Final = 200_000
+"""Moving samples by which the values beside zero are found."""
 
 _MORE: Final = 4.0
 """if there are so many times more of them than of the values beside them [-]."""
@@ -48,9 +51,10 @@ def false_rows(accel: Axes, gyro: Axes, moving: Bools) -> Bools:
         # Otherwise the unit is wrong, which other checks find.
         false |= (size < _LEAST_FORCE) | (size > _MOST_FORCE)
     del size
+    some = np.flatnonzero(moving)[:_ENOUGH]
     for kind, block in enumerate((accel, gyro)):
         for x in block.columns:
-            false |= _spikes(x, _LEAST_SPIKE[kind]) | _zeros(x, moving)
+            false |= _spikes(x, _LEAST_SPIKE[kind]) | _zeros(x, moving, some)
     return np.asarray(false)
 
 
@@ -71,14 +75,14 @@ def _spikes(x: Floats, least: float) -> Bools:
     return np.asarray(found)
 
 
-def _zeros(x: Floats, moving: Bools) -> Bools:
+def _zeros(x: Floats, moving: Bools, rows: Ints) -> Bools:
     zero = x == 0.0
     if not zero.any():
         return np.asarray(zero)
     here = int(np.count_nonzero(zero & moving))
     if here <= _ZEROS * np.count_nonzero(moving):
         return np.zeros(x.size, dtype=bool)
-    some = x[moving][:200_000]
+    some = x[rows]
     levels = np.unique(some)
     place = int(np.searchsorted(levels, 0.0))
     low, high = levels[max(place - 5, 0)], levels[min(place + 5, levels.size - 1)]

@@ -219,7 +219,6 @@ def _laid_out(
     rows = laid_out(
         pose,
         setup,
-        places=False,
         time=time,
         accel=accel,
         specific_force=accel + GRAVITY * np.sin(grade),
@@ -250,8 +249,7 @@ def joined(parts: list[Motion], last: int | None = None) -> Motion:
     columns: dict[str, Any] = {
         name: np.concatenate([getattr(part, name) for part in parts])[keep]
         for name in ("time", "speed", "accel", "specific_force", "grade", "pitch", "roll",
-                     "heading", "distance", "altitude", "latitude", "longitude", "valid",
-                     "grade_std")
+                     "heading", "distance", "altitude", "valid", "grade_std")
     }  # fmt: skip
     return replace(parts[-1], **columns)
 

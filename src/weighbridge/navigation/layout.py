@@ -179,6 +179,7 @@ def smoothed_motion(found: Found, setup: Setup) -> Motion:
         squat_std=squat_std if shown or known else None,
         mounting=mounting,
         mounting_std=mounting_std,
+        position=None if setup.origin is None else (setup.origin, pose.position),
         notes=_notes(setup, shown or known),
     )
 
@@ -213,34 +214,24 @@ def _check_found(scale: float, nodes: Nodes, fixed: Bools, setup: Setup) -> None
         raise Problem.of("gnss.contradicts", "latitude", part=part).error(LostError)
 
 
-def laid_out(pose: Pose, setup: Setup, *, places: bool = True, **rows: object) -> Motion:
-    """Complete a motion by what the pose shows alone: speed, distance, angles and place.
-
-    Without ``places`` latitude and longitude stay unknown, which takes a third of the work.
-    """
+def laid_out(pose: Pose, setup: Setup, **rows: object) -> Motion:
+    """Complete a motion by what the pose shows alone: speed, distance, angles and height."""
     time = rows["time"]
     assert isinstance(time, np.ndarray)
     velocity, heading = pose.velocity, pose.heading
     ahead = velocity[:, 0] * np.cos(heading) + velocity[:, 1] * np.sin(heading)
     size = np.hypot(np.hypot(velocity[:, 0], velocity[:, 1]), velocity[:, 2])
     speed = np.where(size < _STANDS, 0.0, np.copysign(size, ahead))
-    nothing = np.full(time.size, np.nan)
-    latitude, longitude, altitude = nothing, nothing, nothing
-    if setup.origin is not None and places:
-        latitude, longitude, altitude = setup.origin.to_geodetic(pose.position)
-    elif setup.origin is not None:
-        altitude = setup.origin.height(pose.position)
+    nothing, frame = np.full(time.size, np.nan), setup.origin
     way = np.cumsum(0.5 * np.abs(speed[1:] + speed[:-1]) * np.diff(time))
     return Motion(
         source="inertial",
         speed=speed,
         pitch=pose.pitch,
         roll=pose.roll,
-        heading=nothing if setup.origin is None else np.mod(heading, 2.0 * math.pi),
+        heading=nothing if frame is None else np.mod(heading, 2.0 * math.pi),
         distance=np.concatenate([[0.0], way]),
-        altitude=altitude if setup.has_height else nothing,
-        latitude=latitude,
-        longitude=longitude,
+        altitude=frame.height(pose.position) if frame and setup.has_height else nothing,
         speed_delay=setup.speed_delay,
         **rows,  # type: ignore[arg-type]
     )

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Final, Literal
+from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
 from weighbridge.constants import GRAVITY
+from weighbridge.kernels.interpolation import rows_before
 from weighbridge.messages import Problem, phrase
 from weighbridge.signals import Bools, Floats, Ints, Signal
 from weighbridge.signals.robust import spread
+
+if TYPE_CHECKING:
+    from weighbridge.navigation.geodesy import LocalFrame
 
 MotionSource = Literal["inertial", "longitudinal_accel", "speed_grade", "speed"]
 
@@ -94,7 +98,8 @@ class Motion:
     heading : (n,) clockwise from north [rad]; NaN where unknown
     distance : (n,) travelled [m]
     altitude : (n,) [m]; NaN where unknown
-    latitude, longitude : (n,) [rad]; NaN where unknown
+    position : a local frame, and where in it the vehicle was (n, 3), north, east, down [m]; None
+        where unknown, and of a pass forward
     valid : (n,) the sources were there; False in their gaps
     specific_force_std : noise level of ``specific_force``, of one sample [m/s^2]
     grade_std : (n,) standard deviation of ``grade`` as the filter sees it [rad]
@@ -128,11 +133,10 @@ class Motion:
     heading: Floats
     distance: Floats
     altitude: Floats
-    latitude: Floats
-    longitude: Floats
     valid: Bools
     specific_force_std: float
     grade_std: Floats
+    position: tuple[LocalFrame, Floats] | None = None
     speed_scale: float | None = None
     speed_scale_std: float | None = None
     speed_delay: float = 0.0
@@ -177,7 +181,8 @@ class Motion:
 
 def row_before(motion: Motion, time: Floats) -> Ints:
     """Last row that is not after each instant (n,); the first where none is."""
-    return np.maximum(np.searchsorted(motion.time, time, side="right") - 1, 0)
+    found: Ints = rows_before(np.ascontiguousarray(time), motion.time)
+    return found
 
 
 def nearest_row(motion: Motion, time: Floats) -> Ints:

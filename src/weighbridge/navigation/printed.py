@@ -196,7 +196,6 @@ def _laid_out(time: Floats, found: Floats, fixes: Fixes, settings: PrintedFilter
     rows = np.column_stack([np.interp(even, time, column) for column in found.T])
     force, pitch = np.interp(even, time, smooth), rows[:, 2]
     yaw = np.unwrap(found[:, 3])
-    unknown = np.full(even.size, np.nan)
     step = np.maximum(rows[:, 4], 0.0)
     return Motion(
         source="inertial",
@@ -210,8 +209,6 @@ def _laid_out(time: Floats, found: Floats, fixes: Fixes, settings: PrintedFilter
         heading=np.mod(np.interp(even, time, yaw), 2.0 * math.pi),
         distance=np.concatenate([[0.0], np.cumsum(period * 0.5 * (step[1:] + step[:-1]))]),
         altitude=fixes.frame.altitude - rows[:, 7],
-        latitude=unknown,
-        longitude=unknown,
         valid=np.ones(even.size, dtype=bool),
         specific_force_std=noise_level(force),
         grade_std=np.full(even.size, settings.tilt_std),

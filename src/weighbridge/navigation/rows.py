@@ -25,6 +25,7 @@ from weighbridge.kernels.ins_model import (
     Z_VVAR,
     Z_YAW_MOVED,
 )
+from weighbridge.kernels.shaking import widest_spread
 from weighbridge.navigation.aiding import Fixes, interpolated
 from weighbridge.navigation.even import Even
 from weighbridge.navigation.settings import NavigationSettings
@@ -123,18 +124,8 @@ def rests(grid: Even, rot_bs: Floats, limits: tuple[float, float], *, causal: bo
     late = half - round(_QUIET_AHEAD / period) if causal else 0
 
     def spread(y: Floats) -> Floats:
-        z = np.nan_to_num(y, nan=1e3)
-        # Each end is held: np.pad takes longer than all the rest.
-        z = np.concatenate([np.tile(z[:1], (half, 1)), z, np.tile(z[-1:], (half, 1))])
-        top = np.full(y.shape[0], 0.0)
-        for c in range(3):
-            pad = z[:, c]
-            s1 = np.concatenate([[0.0], np.cumsum(pad)])
-            s2 = np.concatenate([[0.0], np.cumsum(pad**2)])
-            n = 2 * half + 1
-            mean = (s1[n:] - s1[:-n]) / n
-            top = np.maximum(top, np.sqrt(np.maximum((s2[n:] - s2[:-n]) / n - mean**2, 0.0)))
-        return top
+        found: Floats = widest_spread(np.nan_to_num(y, nan=1e3), half)
+        return found
 
     quiet: Bools = (spread(grid.values[:, :3] @ rot_bs.T) < limits[0]) & (
         spread(grid.values[:, 3:] @ rot_bs.T) < limits[1]

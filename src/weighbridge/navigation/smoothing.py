@@ -130,9 +130,13 @@ def _smooth_likeliest(
         likelihood = rts.log_likelihood(transition, cov, row, values[::stride], var, start, spread)
         return float(-likelihood + 0.5 * np.sum((level / LEVEL_STD) ** 2)) / thin.size
 
+    def with_slopes(level: Floats) -> tuple[float, list[float]]:
+        here = misfit(level)
+        return here, [(misfit(level + step) - here) / _STEP for step in _STEP * np.eye(levels)]
+
     found = minimize(
-        misfit, np.zeros(levels), method="L-BFGS-B", bounds=[(-_FARTHEST, _FARTHEST)] * levels,
-        options={"ftol": _CLOSE / thin.size, "eps": _STEP},
+        with_slopes, np.zeros(levels), method="L-BFGS-B", jac=True,
+        bounds=[(-_FARTHEST, _FARTHEST)] * levels, options={"ftol": _CLOSE / thin.size},
     ).x  # fmt: skip
     clock, z, at = _merged(stamps, values, time)
     transition, cov, noise, start, spread = model(clock, found)

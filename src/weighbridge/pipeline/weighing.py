@@ -475,29 +475,28 @@ def torque_balance(drive: Drive, vehicle: Vehicle) -> tuple[ForceBalance, tuple[
     found, navigation = identify_motion(drive, vehicle)
     motion = of_vehicle(found, vehicle)
     delay = vehicle.timing.torque_delay
-    drive, drifted, begun = smoothed_steps(drive, vehicle, motion, delay or 0.0)
+    balance = force_balance(drive, vehicle, motion, delay=delay or 0.0)
+    drive, drifted, balance = smoothed_steps(drive, vehicle, balance)
     notes = motion.notes + drifted
     if delay is None:
-        delay = estimate_torque_delay(drive, vehicle, motion, begun)
+        delay = estimate_torque_delay(drive, vehicle, motion, balance)
         if math.isfinite(delay):
             notes += (Problem.of("torque.delay_found", delay=delay),)
         else:
             delay = 0.0
             notes += (Problem.of("torque.delay_unknown"),)
     elif vehicle.provenance.torque_fitted:
-        later = _other_clock(drive, vehicle, motion, delay, begun)
+        later = _other_clock(drive, vehicle, motion, balance)
         if later:
             delay += later
             notes += (Problem.of("torque.clock_moved", later=_later(later), by=later),)
-    if begun is None or begun.delay != delay:
-        begun = force_balance(drive, vehicle, motion, delay=delay)
-    balance = replace(begun, navigation=navigation)
+    if balance.delay != delay:
+        balance = force_balance(drive, vehicle, motion, delay=delay)
+    balance = replace(balance, navigation=navigation)
     return balance, notes + other_equipment(vehicle, balance) + balance.notes
 
 
-def _other_clock(
-    drive: Drive, vehicle: Vehicle, motion: Motion, delay: float, begun: ForceBalance | None
-) -> float:
+def _other_clock(drive: Drive, vehicle: Vehicle, motion: Motion, balance: ForceBalance) -> float:
     """By how much the torque of a drive is later than in the calibration [s]; 0 where it is not.
 
     Raises
@@ -506,7 +505,7 @@ def _other_clock(
         The clocks of torque and motion are `CLOCKS_APART` or more off, and not those of speed
         and motion by as much.
     """
-    later = clock_shift(drive, vehicle, motion, delay, begun)
+    later = clock_shift(drive, vehicle, motion, balance)
     # As late as the speed beside it: the whole table is, and the shift brings all of it back.
     of_table = motion.speed_delay > CLOCKS_APART and abs(motion.speed_delay - later) < ONE_TABLE
     if abs(later) > CLOCKS_APART and not of_table:

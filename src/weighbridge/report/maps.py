@@ -52,19 +52,20 @@ def positions(weighing: MassResult) -> Positions | None:
     """Find where the vehicle was, from the motion or the recorded fixes; None if unknown."""
     if weighing.result is not None:
         motion = weighing.result.balance.motion
-        known = np.isfinite(motion.latitude) & np.isfinite(motion.longitude) & motion.valid
-        if np.count_nonzero(known) > 1:
-            return _local(motion.time, motion.latitude, motion.longitude, motion.speed, known)
-    latitude, longitude = weighing.drive.get("latitude"), weighing.drive.get("longitude")
-    if latitude is None or longitude is None or len(latitude) < 2:
+        if motion.position is not None and np.count_nonzero(motion.valid) > 1:
+            frame, ned = motion.position
+            latitude, longitude, _ = frame.to_geodetic(ned)
+            return _local(motion.time, latitude, longitude, motion.speed, motion.valid)
+    north, east = weighing.drive.get("latitude"), weighing.drive.get("longitude")
+    if north is None or east is None or len(north) < 2:
         return None
-    east = longitude.at(latitude.time)
+    beside = east.at(north.time)
     speed = weighing.drive.speed
-    pace = speed.at(latitude.time) if speed is not None else np.full(len(latitude), np.nan)
-    known = np.isfinite(east)
+    pace = speed.at(north.time) if speed is not None else np.full(len(north), np.nan)
+    known = np.isfinite(beside)
     if np.count_nonzero(known) < 2:
         return None
-    return _local(latitude.time, latitude.values, east, pace, known)
+    return _local(north.time, north.values, beside, pace, known)
 
 
 def track_map(track: Positions, tiles: Tiles | None = None) -> go.Figure:

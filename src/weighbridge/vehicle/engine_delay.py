@@ -7,6 +7,7 @@ from typing import Final
 import numpy as np
 
 from weighbridge.signals import Bools, Floats, Ints
+from weighbridge.signals.interpolation import interpolate
 from weighbridge.signals.robust import huber, spread
 from weighbridge.vehicle.gear import (
     HIGHEST_GEARING,
@@ -28,6 +29,9 @@ ALIKE: Final = 0.01
 
 ROUNDS: Final = 4
 """Of moving the engine speed and looking again: a wrong delay puts rows beside their gears."""
+
+SETTLED: Final = 1e-5
+"""A smaller move is the last [s]."""
 
 REWEIGHTED: Final = 5
 """Rounds of weighing rows by how far they lie off."""
@@ -97,7 +101,9 @@ def find_engine_delay(
         slope, variance = _slope(*rows)
         # The slope is how much too early the rows are looked at; it counts from the usual one.
         trust = USUAL_STD**2 / (USUAL_STD**2 + variance)
-        delay = usual + trust * (delay - slope - usual)
+        before, delay = delay, usual + trust * (delay - slope - usual)
+        if abs(delay - before) < SETTLED:
+            break
     return float(delay) if abs(delay - usual) > ALIKE else usual
 
 
@@ -126,7 +132,7 @@ def gathered_delay(
 
 def _entropy(time: Floats, engine_speed: Floats, motion: tuple[Floats, Floats]) -> float:
     """Entropy of the ratios of engine to vehicle speed [nat]; infinite of too few."""
-    speed = np.interp(time, *motion, left=0.0, right=0.0)
+    speed = interpolate(time, *motion, left=0.0, right=0.0)
     ratio = effective_gearing(engine_speed, speed)
     used = (speed > UNSLIPPED) & (ratio > LOWEST_GEARING) & (ratio < HIGHEST_GEARING)
     if np.count_nonzero(used) < FEWEST:
@@ -138,24 +144,24 @@ def _entropy(time: Floats, engine_speed: Floats, motion: tuple[Floats, Floats]) 
 
 def _in_gear(
     time: Floats, engine_speed: Floats, motion: tuple[Floats, Floats], gearings: Floats
-) -> tuple[Floats, Floats, Floats, float] | None:
+) -> tuple[Floats, Floats, Ints, float] | None:
     """Rows in gear: dv/dt / v, logarithm of the ratio, gear, rows per independent one."""
     instants, speeds = motion
     inside = (time > instants[0]) & (time < instants[-1]) & np.isfinite(engine_speed)
     time, engine_speed = time[inside], engine_speed[inside]
     if time.size < FEWEST:
         return None
-    speed = np.interp(time, instants, speeds)
+    speed = interpolate(time, instants, speeds)
     ratio = effective_gearing(engine_speed, speed)
     gear, _ = predict_gear(engine_speed, speed, gearings)
     held = steady(time, ratio, np.full(time.size, STEADY)) & (gear > 0) & (speed > SLIPS)
     held &= _often(gear, held)
     if np.count_nonzero(held) < FEWEST:
         return None
-    ahead, behind = (np.interp(time[held] + by, instants, speeds) for by in (HALF, -HALF))
+    ahead, behind = (interpolate(time[held] + by, instants, speeds) for by in (HALF, -HALF))
     rate = (ahead - behind) / (2.0 * HALF * speed[held])
     alike = max(1.0, LASTING / float(np.median(np.diff(time))))
-    return rate, np.log(ratio[held]), gear[held].astype(np.float64), alike
+    return rate, np.log(ratio[held]), gear[held], alike
 
 
 def _often(gear: Ints, held: Bools) -> Bools:
@@ -164,14 +170,13 @@ def _often(gear: Ints, held: Bools) -> Bools:
     return np.asarray(count[gear] >= FEWEST)
 
 
-def _slope(rate: Floats, log_ratio: Floats, gear: Floats, alike: float) -> tuple[float, float]:
+def _slope(rate: Floats, log_ratio: Floats, gear: Ints, alike: float) -> tuple[float, float]:
     """Slope of the logarithm of the ratio on dv/dt / v within gears [s], and its variance."""
-    _, group = np.unique(gear, return_inverse=True)
     weight = np.ones(rate.size)
     for _ in range(REWEIGHTED):
-        total = np.bincount(group, weights=weight)
-        x = rate - (np.bincount(group, weights=weight * rate) / total)[group]
-        y = log_ratio - (np.bincount(group, weights=weight * log_ratio) / total)[group]
+        total = np.maximum(np.bincount(gear, weights=weight), 1e-300)
+        x = rate - (np.bincount(gear, weights=weight * rate) / total)[gear]
+        y = log_ratio - (np.bincount(gear, weights=weight * log_ratio) / total)[gear]
         power = float(np.sum(weight * x * x))
         if not power > 0.0:
             return 0.0, np.inf

@@ -13,7 +13,7 @@ from weighbridge.constants import GRAVITY
 from weighbridge.kernels.rotation import euler_to_matrix
 from weighbridge.messages import Problem, refused
 from weighbridge.navigation.aiding import Fixes, interpolated, resample, speed_from_fixes
-from weighbridge.navigation.even import Even, coarsely
+from weighbridge.navigation.even import Even
 from weighbridge.navigation.identify.mounting import (
     CoarseMounting,
     TooLittleMotionError,
@@ -68,9 +68,15 @@ class Alignment:
 
 
 def align(
-    fine: Even, reference: Signal, mounting: Mounting | None
+    fine: Even, coarse_imu: Even, reference: Signal, mounting: Mounting | None
 ) -> tuple[Alignment, tuple[Problem, ...]]:
     """Find how the sensor sits and how late the speed is, from a whole drive.
+
+    Parameters
+    ----------
+    fine, coarse_imu : inertial samples on the clocks of delays and of the coarse alignment
+    reference : speed
+    mounting : the one known
 
     Returns
     -------
@@ -82,7 +88,6 @@ def align(
     DriveError
         The drive is too quiet, or units or axes do not fit together.
     """
-    coarse_imu = coarsely(fine, COARSE_PERIOD)
     found, notes = _prior(mounting), list[Problem]()
     coarse = None
     for _ in range(2):

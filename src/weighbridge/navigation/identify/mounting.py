@@ -169,8 +169,9 @@ def _regressed(
             design = design[:, :3]
         weight = np.ones(a.size)
         for _ in range(3):
-            root = np.sqrt(weight)[:, None]
-            sol, *_ = np.linalg.lstsq(design * root, f * root, rcond=None)
+            weighted = (design * weight[:, None]).T
+            info = np.linalg.inv(weighted @ design + 1e-9 * np.eye(design.shape[1]))
+            sol = info @ (weighted @ f)
             res = f - design @ sol
             size = np.linalg.norm(res, axis=1)
             weight = huber(size, float(np.median(size)), 1.5)

@@ -176,10 +176,11 @@ def _mounted(sources: Sources, mounting: Mounting | None, scale: _Scale) -> _Mou
         accel = scaled(imu.time, imu.accel[:], scale.gains, scale.axis)
         imu = replace(imu, accel=Axes.of(accel))
     fine = evenly(imu, FINE_RATE)
-    aligned, align_notes = align(fine, sources.reference, mounting)
+    coarse = coarsely(fine, COARSE_PERIOD)
+    aligned, align_notes = align(fine, coarse, sources.reference, mounting)
     shifted = undelayed(sources.reference, aligned.speed_delay)
     altitude = sources.drive.get("altitude")
-    changes = find_changes(coarsely(fine, COARSE_PERIOD), shifted, aligned.rot_bs, altitude)
+    changes = find_changes(coarse, shifted, aligned.rot_bs, altitude)
     if not changes:
         return _Mounted(imu, fine, aligned, (), (*notes, *align_notes))
     keep = ~unsure(imu.time, changes)
@@ -187,7 +188,8 @@ def _mounted(sources: Sources, mounting: Mounting | None, scale: _Scale) -> _Mou
     values = undo(time, np.hstack([imu.accel[keep], imu.gyro[keep]]), changes)
     imu = Imu(time, Axes.of(values[:, :3]), Axes.of(values[:, 3:]), imu.period)
     fine = evenly(imu, FINE_RATE)
-    aligned, align_notes = align(fine, sources.reference, mounting)
+    coarse = coarsely(fine, COARSE_PERIOD)
+    aligned, align_notes = align(fine, coarse, sources.reference, mounting)
     moved = remounting_notes(changes, float(time[0]), float(time[-1]))
     return _Mounted(imu, fine, aligned, tuple(changes), (*notes, *moved, *align_notes))
 

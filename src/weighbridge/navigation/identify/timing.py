@@ -101,12 +101,20 @@ def _minimum(
     The curvature is negative where the least lies at ``low`` or ``high``.
     """
     grid = np.arange(low, high + 1e-9, 0.1)
-    cost = np.array([residual(d) for d in grid])
-    best = float(grid[int(np.argmin(cost))])
+    cost = {k: residual(float(grid[k])) for k in range(0, grid.size, 2)}
+    middle = min(cost, key=lambda k: cost[k])
+    cost |= {k: residual(float(grid[k])) for k in (middle - 1, middle + 1) if 0 <= k < grid.size}
+    best = float(grid[min(cost, key=lambda k: cost[k])])
     fine = best + np.arange(-0.1, 0.1001, 0.02)
-    cost_fine = np.array([residual(d) for d in fine])
-    k = int(np.clip(np.argmin(cost_fine), 1, fine.size - 2))
-    left, mid, right = (float(c) for c in cost_fine[k - 1 : k + 2])
+    cost, k = {}, fine.size // 2
+    while True:
+        near = range(k - 1, k + 2)
+        cost |= {j: residual(float(fine[j])) for j in near if j not in cost}
+        lowest = int(np.clip(min(near, key=lambda j: cost[j]), 1, fine.size - 2))
+        if lowest == k:
+            break
+        k = lowest
+    left, mid, right = (cost[j] for j in near)
     curvature = (left - 2.0 * mid + right) / 0.02**2
     if curvature <= 0.0 or not low < best < high:
         return best, mid, -1.0
