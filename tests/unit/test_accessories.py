@@ -115,7 +115,7 @@ def test_the_interval_is_narrower_than_that_of_a_scale_that_takes_it_for_noise(
 
 def test_a_calibration_knows_what_was_switched(switched, car, monkeypatch):
     """What the compressor takes, four sevenths of the time, is no torque that the engine lacks."""
-    monkeypatch.setattr(joint_fit, "_accessories", lambda *_: [None, None])
+    monkeypatch.setattr(joint_fit, "_as_shown", lambda rows, *_: rows)
     blind = calibrated(switched)
     offset, blindly = (f.torque.coefficients[0] for f in (car, blind))
     turning = np.median(switched[0].drive.signals["engine_speed"].values)
