@@ -21,6 +21,7 @@ from tests.unit.test_weighing import weighing as weighed_by_rls
 
 from weighbridge import compare
 from weighbridge.balance import ForceBalance, Reason
+from weighbridge.navigation.geodesy import LocalFrame
 from weighbridge.report import mass_figure
 
 
@@ -143,9 +144,11 @@ def test_each_load_of_a_drive_is_inside_the_figure_of_the_mass(tmp_path):
 def test_a_map_has_a_bar_of_a_round_length(tmp_path, metres):
     w = make_weighing(hours=0.1)
     motion = w.result.balance.motion
-    way = np.linspace(0.0, metres / 6.36e6, motion.time.size)
+    way = np.zeros((motion.time.size, 3))
+    way[:, 0] = np.linspace(0.0, metres, motion.time.size)
     balance = ForceBalance(
-        motion=replace(motion, latitude=0.97 + way), table=w.result.balance.table
+        motion=replace(motion, position=(LocalFrame(0.97, 0.2, 0.0), way)),
+        table=w.result.balance.table,
     )
     html = written(tmp_path, [replace(w, result=replace(w.result, balance=balance))])
     figure = over(html, "East [km]")[0]

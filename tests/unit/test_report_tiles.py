@@ -11,6 +11,7 @@ from tests.unit.test_report import Elements, figures, make_weighing, written
 
 from weighbridge import ConfigError
 from weighbridge.balance import ForceBalance
+from weighbridge.navigation.geodesy import LocalFrame
 
 SERVER = "https://tiles.example.org/{z}/{x}/{y}.png"
 MOST = 30
@@ -18,20 +19,19 @@ MOST = 30
 
 
 def on_map(tmp_path, latitude, longitude):
-    """Return the images under the map of a drive along these places, and a point of its track."""
+    """Return the images under the map of a drive along these places, and its middle [rad]."""
     w = make_weighing(hours=0.1)
     motion, table = w.result.balance.motion, w.result.balance.table
     part = np.linspace(0.0, 1.0, motion.time.size)
     along = np.linspace(0.0, 1.0, latitude.size)
-    motion = replace(
-        motion,
-        latitude=np.interp(part, along, latitude),
-        longitude=np.interp(part, along, longitude),
-    )
+    frame = LocalFrame(latitude[0], longitude[0], 0.0)
+    latitude, longitude = (np.interp(part, along, x) for x in (latitude, longitude))
+    ned = frame.to_ned(latitude, longitude, np.zeros(part.size))
+    motion = replace(motion, position=(frame, ned))
     w = replace(w, result=replace(w.result, balance=ForceBalance(motion=motion, table=table)))
     (figure,) = [f for f in figures(written(tmp_path, [w], tiles=SERVER)).values()
                  if "images" in f["layout"]]  # fmt: skip
-    return figure["layout"]["images"], motion
+    return figure["layout"]["images"], (np.median(latitude), np.median(longitude))
 
 
 def corners(image):
@@ -63,8 +63,7 @@ def test_the_server_is_allowed_told_and_the_only_one(tmp_path):
 def test_tiles_lie_where_they_belong_and_cover_the_track(tmp_path):
     latitude = np.radians(np.linspace(48.0, 48.05, 50))
     longitude = np.radians(np.linspace(11.5, 11.6, 50))
-    images, motion = on_map(tmp_path, latitude, longitude)
-    middle = float(np.median(motion.latitude)), float(np.median(motion.longitude))
+    images, middle = on_map(tmp_path, latitude, longitude)
     bounds = np.array([corners(i) for i in images])
     east, north, _ = pymap3d.geodetic2enu(latitude, longitude, 0.0, *middle, 0.0, deg=False)
     for x, y in zip(east / 1e3, north / 1e3, strict=True):
