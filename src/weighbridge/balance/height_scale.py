@@ -81,7 +81,9 @@ def height_scale(
     ratios = by_hills / by_motion
     ratio = float(ratios[0])
     std = float(np.sqrt((count - 1) / count * np.sum((ratios[1:] - ratios[1:].mean()) ** 2)))
-    steep, flat = ratio + SURE * std < STEEPEST, ratio - SURE * std > FLATTEST
+    # Hills of heights that are noise alone, on a flat road, take no force either way.
+    steep = ratio + SURE * std < STEEPEST and abs(ratio) > SURE * std
+    flat = ratio - SURE * std > FLATTEST
     if not (steep or flat):
         return None
     feet, factor = unit == "ft", UNITS["ft"].factor
