@@ -90,7 +90,7 @@ def test_the_map_is_found_where_the_motion_is_noisy(motion_noise):
 @pytest.mark.parametrize("known", [False, True])
 def test_noise_of_a_measured_motion_is_not_taken_for_information(known):
     rng = np.random.default_rng(5)
-    noise, drives = 0.25, []
+    noise, drives = 0.08, []
     for _ in range(2):
         drive = made(rng, 0.0)
         seen = drive.table.specific_force + rng.normal(0.0, noise, drive.table.time.size)

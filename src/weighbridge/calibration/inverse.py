@@ -27,7 +27,7 @@ from weighbridge.estimators.joint.slow_errors import (
     WIND_STD,
     noise_variance,
 )
-from weighbridge.estimators.noisy_motion import MOSTLY
+from weighbridge.estimators.noisy_motion import too_low
 from weighbridge.kernels import disturbance as kernel
 from weighbridge.navigation.motion import Motion
 from weighbridge.signals import Bools, Floats
@@ -509,9 +509,9 @@ def without_noise(state: kernel.DisturbanceState, information: float) -> kernel.
     Fuller, Measurement Error Models, 1987, ch. 2.2.
     """
     gain = state.cov[:, 0]
-    noise = information / (1.0 - min(information * float(gain[0]), MOSTLY))
+    missing = float(too_low(information * gain[0])) / gain[0]
     return state._replace(
-        x=state.x + gain * noise * state.x[0], cov=state.cov + noise * np.outer(gain, gain)
+        x=state.x + gain * missing * state.x[0], cov=state.cov + missing * np.outer(gain, gain)
     )
 
 

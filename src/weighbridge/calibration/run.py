@@ -245,7 +245,7 @@ def _unmeasured_grade(problem: Problem) -> float:
 
 def _torque_period(problem: Problem) -> float:
     """From one sample of the torque to the next, the longest of all drives [s]."""
-    return round(max(r.source.carrier(r.drive).period for r in problem.recordings), 3)
+    return round(max(r.source.carrier(r.drive).period for r in problem.recordings), 6)
 
 
 def _stated_reference(drives: Sequence[Drive], problem: Problem) -> float | None:

@@ -114,18 +114,17 @@ a truck by 1 to 2 %, 2 Hz by 3 to 9 %."""
 
 
 def sampled_otherwise(vehicle: Vehicle, balance: ForceBalance) -> float | None:
-    """From one torque to the next where it is another one than in the calibration and matters [s].
+    """Time between two torques of a drive, if the calibration had another [s]; else None.
 
-    It matters without an accelerometer and where hills slow a vehicle down: how much of the motion
-    is noise shows less well between samples that are further apart.
+    Only of vehicles that hills slow down, and where neither had an accelerometer: samples that are
+    further apart show less well how much of the motion is noise.
     """
-    then, time = vehicle.provenance.torque_period, balance.table.time
-    if then is None or not vehicle.of_class.underpowered or time.size < 2:
+    made, time = vehicle.provenance, balance.table.time
+    alike = made.motion in BY_SPEED and balance.motion.source in BY_SPEED
+    if made.torque_period is None or not (alike and vehicle.of_class.underpowered):
         return None
-    now = float(np.median(np.diff(time)))
-    if balance.motion.source not in BY_SPEED or 1.0 / RATES_APART < now / then < RATES_APART:
-        return None
-    return now
+    now = float(np.median(np.diff(time))) if time.size > 1 else made.torque_period
+    return None if 1.0 / RATES_APART < now / made.torque_period < RATES_APART else now
 
 
 def grade_apart(vehicle: Vehicle, motion: Motion) -> float:

@@ -61,27 +61,25 @@ def other_equipment(vehicle: Vehicle, balance: ForceBalance) -> tuple[Problem, .
     That is with another accelerometer, grade or rate of the torque.
     """
     motion, made = balance.motion, vehicle.provenance
+    notes = []
     period = sampled_otherwise(vehicle, balance)
     if period is not None:
-        return (
-            Problem.of(
-                "torque.other_rate", now=period, then=made.torque_period, vehicle=vehicle.name
-            ),
-        )
+        then = made.torque_period
+        notes.append(Problem.of("torque.other_rate", now=period, then=then, vehicle=vehicle.name))
     if grade_apart(vehicle, motion) > GRADES_APART:
-        now, then = motion.unmeasured_grade, made.unmeasured_grade or 0.0
-        return (
+        grade, known = motion.unmeasured_grade, made.unmeasured_grade or 0.0
+        notes.append(
             Problem.of(
                 "motion.grade_apart",
-                now=100.0 * now,
-                then=100.0 * then,
+                now=100.0 * grade,
+                then=100.0 * known,
                 vehicle=vehicle.name,
-                word="light" if now > then else "heavy",
-            ),
+                word="light" if grade > known else "heavy",
+            )
         )
-    if not lacks_accelerometer(vehicle, motion):
-        return ()
-    return (Problem.of("motion.no_accelerometer", vehicle=vehicle.name),)
+    if lacks_accelerometer(vehicle, motion):
+        notes.append(Problem.of("motion.no_accelerometer", vehicle=vehicle.name))
+    return tuple(notes)
 
 
 def fitted_for_another(vehicle: Vehicle, method: str) -> tuple[Problem, ...]:
