@@ -202,7 +202,7 @@ NAMED: Final[tuple[tuple[Callable[..., Any], dict[str, str]], ...]] = (
         "balance.foot": "_pressed _noisy",
         "estimators.judging": "lacks_accelerometer",
         "navigation.identify.remounting": "_seen_by_gyro",
-        "balance.braking": "_misses _braked _trailing retarder_untold",
+        "balance.braking": "_misses _braked _trailing retarder_unreported",
     }),
     (_empty, {
         "calibration.questionable_masses": "questionable_masses contradicting unbacked_scale",

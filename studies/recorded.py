@@ -109,7 +109,7 @@ FIRST = 550.0
 
 def bmw_i3() -> str:
     car = wb.Vehicle.load(EXAMPLE / "vehicle.toml")
-    told = overview()
+    trips = overview()
     lines = [
         "| trip | date | noted | min | used min | mass kg | 95 % interval ± % | noise kg "
         "| torque reads, by battery | `rls` kg | offset m/s² |",
@@ -118,7 +118,7 @@ def bmw_i3() -> str:
     rows = []
     reach = []
     for name, drive in trips().items():
-        when, note = told[name]
+        when, note = trips[name]
         load = " ".join(found.group(0).split()) if (found := LOAD_NOTE.search(note)) else ""
         head = f"| {name} | {when:%Y-%m-%d %H:%M} | {load} | {drive.duration / 60:.1f} |"
         w = wb.weigh(drive, car, method="joint")
@@ -142,7 +142,7 @@ def bmw_i3() -> str:
     draw_trips(rows, low, high, middle)
     lines += [
         "",
-        f"{mass.size} of {len(told)} trips of the table are there and weighed. The shortest "
+        f"{mass.size} of {len(trips)} trips of the table are there and weighed. The shortest "
         f"interval that holds a third of them runs from {low:.0f} to {high:.0f} kg, "
         f"{100 * (high - low) / middle:.1f} % of its median "
         f"(`rls`: {100 * (other[1] - other[0]) / other[2]:.1f} %). The 95 % interval is "
@@ -455,12 +455,12 @@ def gear_line(name: str, drives: list[wb.Drive], known: tuple[float, ...]) -> st
         speed.append(wheels.at(rpm.time)[inside])
     found = detect_gearings(*map(np.concatenate, (time, engine, speed)), speed_step=1 / 3.6)
     ratios = found.gearings / RPM_PER_KMH
-    told = []
+    shown = []
     for ratio in known:
         nearest = ratios[np.argmin(np.abs(np.log(ratios / ratio)))]
         off = 100.0 * (nearest / ratio - 1.0)
-        told.append(f"{nearest:.2f} ({off:+.1f} %)" if abs(off) < 5.0 else "–")
-    return f"| {name} | {' | '.join(told)} | {ratios.size} |"
+        shown.append(f"{nearest:.2f} ({off:+.1f} %)" if abs(off) < 5.0 else "–")
+    return f"| {name} | {' | '.join(shown)} | {ratios.size} |"
 
 
 def idle_line(drives: list[tuple[str, wb.Drive]]) -> str:
@@ -477,10 +477,11 @@ def idle_line(drives: list[tuple[str, wb.Drive]]) -> str:
             values = 100.0 * torque.values[idle & where & (torque.values > 0.0)]
             if values.size >= 20:
                 found.append(float(np.median(values)))
-    told = [", ".join(f"{v:.0f}" for v in sorted(values)) for values in (rolling, standing)]
+    listed = [", ".join(f"{v:.0f}" for v in sorted(values)) for values in (rolling, standing)]
     return (
         "PID 62 below 1200 rpm with a coolant above 70 °C: rolling, the medians of "
-        f"{len(rolling)} files are {told[0]} %; standing, of {len(standing)} files, {told[1]} %."
+        f"{len(rolling)} files are {listed[0]} %; standing, of {len(standing)} files, "
+        f"{listed[1]} %."
     )
 
 
@@ -626,13 +627,13 @@ def canedge_regressions(drives: list[tuple[str, wb.Drive]]) -> str:
         row /= reference
         found.append(row)
         part = (a @ a) / (a @ a + hill @ hill)
-        told = "–" if np.isnan(own) else f"{own:+.2f}"
+        shown = "–" if np.isnan(own) else f"{own:+.2f}"
         lines.append(
-            f"| {name} | {told} | {' | '.join(f'{x:.2f}' for x in row)} | {100 * part:.0f} % |"
+            f"| {name} | {shown} | {' | '.join(f'{x:.2f}' for x in row)} | {100 * part:.0f} % |"
         )
     rows = np.array(found)
     spread = 100.0 * rows.std(axis=0, ddof=1) / rows.mean(axis=0)
-    told = " | ".join(f"{m:.2f}, {s:.1f} %" for m, s in zip(rows.mean(0), spread, strict=True))
+    means = " | ".join(f"{m:.2f}, {s:.1f} %" for m, s in zip(rows.mean(0), spread, strict=True))
     weighed = np.array(
         [
             joint.estimate(force_balance(drive, car, motion, delay=delay), car).mass / reference
@@ -640,7 +641,7 @@ def canedge_regressions(drives: list[tuple[str, wb.Drive]]) -> str:
         ]
     )
     lines += [
-        f"| mean, sd | {delay:+.2f} (median) | {told} | |",
+        f"| mean, sd | {delay:+.2f} (median) | {means} | |",
         "",
         f"`joint` with the median delay for all of them: {', '.join(f'{x:.2f}' for x in weighed)}, "
         f"mean {weighed.mean():.2f} kg per N m, sd "

@@ -129,7 +129,8 @@ def draw_intervals(car: wb.Vehicle) -> None:
         axes.plot([number + 1] * 2, [low, high], color=colour, lw=2.5)
         axes.plot(number + 1, weighed.mass - truth, "o", color=colour, ms=4)
     axes.axhline(0.0, color=GREY, lw=1)
-    axes.set(xlabel="drive", ylabel="mass told, less the true mass (kg)", xticks=[1, 5, 10, 15, 20])
+    axes.set(xlabel="drive", ylabel="estimated mass minus true mass (kg)")
+    axes.set_xticks([1, 5, 10, 15, 20])
     _save(figure, "intervals")
 
 

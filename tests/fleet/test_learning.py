@@ -56,9 +56,11 @@ def test_drives_that_contradict_their_file_refine_it(tmp_path, short_drive, shor
     assert (row["vehicle_id"], row["drives"], row["refined"]) == ("car", 2, "car.toml")
     assert row["error_pct"] == pytest.approx(100.0 * off.mean(), abs=0.1)
     assert row["contradicted"]
-    assert "too heavy" in row["told"]
+    assert "too heavy" in row["findings"]
     (told,) = wb.fleet.report(results).to_dict()["learnt"]
-    assert (told["verdict"], told["told"]) == ("contradicted", row["told"])
+    assert (told["verdict"], told["findings"]) == ("contradicted", row["findings"])
+    pl.DataFrame([row]).rename({"findings": "told"}).write_parquet(results / "learnt.parquet")
+    assert wb.fleet.report(results).to_dict()["learnt"] == [told]
     assert (cars / "car.toml").read_bytes() == before
     again = wb.weigh(drives / "car" / "trip-0", learnt / "car.toml")
     assert again.mass == pytest.approx(mass, rel=0.03)
@@ -94,8 +96,8 @@ def test_a_vehicle_that_kills_its_worker_loses_nothing_of_the_others(
     assert (car["vehicle_id"], car["weighed"], car["refined"]) == ("car", 1, "car.toml")
     assert wb.Vehicle.load(tmp_path / "learnt" / "car.toml").torque is not None
     assert (deadly["vehicle_id"], deadly["drives"], deadly["refined"]) == ("deadly", 1, None)
-    assert deadly["told"].startswith("nothing was learnt: its worker ended 3 times")
-    assert odd["told"] == "nothing was learnt: KeyError: 'gone'"
+    assert deadly["findings"].startswith("nothing was learnt: its worker ended 3 times")
+    assert odd["findings"] == "nothing was learnt: KeyError: 'gone'"
 
 
 def test_learning_never_writes_over_what_is_read(tiny, tmp_path, scheduler):
@@ -215,6 +217,6 @@ def test_raw_logs_are_learnt_from_with_the_databases_of_the_fleet(tmp_path, shor
         id="car", file="car.toml", vehicle=short_car, kind="car", mapping=None, digest=""
     )
     lesson = Lesson(assigned=car, drives=(known,), output=str(tmp_path))
-    assert "engine_torque" in learn_vehicle(lesson)["told"]
-    lost = learn_vehicle(replace(lesson, dbc=(str(tmp_path / "lost.dbc"),)))["told"]
+    assert "engine_torque" in learn_vehicle(lesson)["findings"]
+    lost = learn_vehicle(replace(lesson, dbc=(str(tmp_path / "lost.dbc"),)))["findings"]
     assert named(lost, "can.log --dbc lost.dbc")

@@ -34,7 +34,7 @@ def page(tmp_path_factory):
         write_part(folder, key, [row | {"segments": [{n: told[n] for n in inner}]}])
     learnt = {
         "vehicle_id": "truck2", "drives": 4, "weighed": 4, "error_pct": 12.34, "error_std_pct": 4.0,
-        "contradicted": True, "refined": "truck2.toml", "told": "4 drives contradict the file",
+        "contradicted": True, "refined": "truck2.toml", "findings": "4 drives contradict the file",
     }  # fmt: skip
     write_learnt(folder, [learnt])
     path = home / "fleet.html"

@@ -266,7 +266,7 @@ def test_gears_that_are_named_and_not_found_are_told(empty):
     assert unfound_gears([empty.drive.without("gear")], 3) is None
 
 
-def test_percent_of_a_reference_torque(empty, measured):
+def test_percent_of_a_reference_torque(empty, measured, tmp_path):
     torque = with_torque(empty).signals["engine_torque"]
     drive = empty.drive.with_signals(
         Signal("engine_torque_fraction", torque.time, torque.values / 250.0)
@@ -279,11 +279,18 @@ def test_percent_of_a_reference_torque(empty, measured):
     assert car.torque.coefficients == pytest.approx(
         measured.torque.coefficients, rel=1e-3, abs=0.05
     )
-    assert car.torque.told_reference_torque is None
+    assert car.torque.reported_reference_torque is None
     told = Signal("reference_torque", np.arange(0.0, 60.0, 5.0), np.full(12, 250.0))
     quick = CalibrationSettings(source="percent", method="rls")
     car = calibrate(drive.with_signals(told), settings=quick)
-    assert car.torque.told_reference_torque == 250.0
+    assert car.torque.reported_reference_torque == 250.0
+    car.save(tmp_path / "car.toml")
+    text = (tmp_path / "car.toml").read_text()
+    earlier = text.replace("reported_reference_torque_nm", "told_reference_torque_nm")
+    (tmp_path / "earlier.toml").write_text(earlier)
+    again = Vehicle.load(tmp_path / "earlier.toml")
+    assert earlier != text
+    assert again.torque.reported_reference_torque == 250.0
 
 
 def test_the_steps_of_the_reading_are_kept(car):

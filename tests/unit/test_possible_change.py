@@ -72,7 +72,7 @@ def test_a_change_that_is_likely_is_told_with_its_stop():
     assert -400.0 < possible.difference < -100.0
     note = possible.note
     assert note.id == "load.possible"
-    assert f"{given.time[120]:.0f} s" in note.values["told"]
+    assert f"{given.time[120]:.0f} s" in note.values["found"]
 
 
 def test_stops_without_a_change_widen_little():
@@ -118,7 +118,7 @@ def test_a_change_found_that_the_rest_denies_is_averaged_away():
 def test_a_change_found_that_may_be_none_is_told():
     note = PossibleChange(math.nan, 0.0, 1492.0, 0.38).note
     assert note.id == "load.possible"
-    assert "38 %" in note.values["told"]
+    assert "38 %" in note.values["found"]
 
 
 def test_a_stop_at_which_a_change_was_found_is_not_tried_again():

@@ -126,7 +126,7 @@ def test_a_reference_torque_that_is_not_that_of_the_calibration():
             found,
             Vehicle(
                 torque=TorqueModel(
-                    source=source, coefficients=coefficients, told_reference_torque=reported
+                    source=source, coefficients=coefficients, reported_reference_torque=reported
                 )
             ),
         )

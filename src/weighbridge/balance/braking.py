@@ -131,7 +131,7 @@ def find_brakes(
     foot = find_foot(drive, vehicle, source, need, torque, by)
     # What a dragged engine takes is shown by a torque alone, and by none where a foot may brake,
     # or a retarder.
-    released = signed and pressed is not None and not retarder_untold(drive, vehicle)
+    released = signed and pressed is not None and not retarder_unreported(drive, vehicle)
     overrun = np.zeros_like(foot.off) if released else foot.off
     slowed = foot.off if pressed is None else pressed
     reported = traction if signed else None
@@ -147,7 +147,7 @@ def find_brakes(
     )
 
 
-def retarder_untold(drive: Drive, vehicle: Vehicle) -> bool:
+def retarder_unreported(drive: Drive, vehicle: Vehicle) -> bool:
     """Whether a retarder may slow the vehicle that neither switch nor signal shows."""
     retarder = drive.get("retarder_torque")
     recorded = retarder is not None and len(retarder) > 0

@@ -10,7 +10,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from weighbridge.balance.braking import Brakes, find_brakes, retarder_untold
+from weighbridge.balance.braking import Brakes, find_brakes, retarder_unreported
 from weighbridge.balance.coarse import coarse_std
 from weighbridge.balance.cornering import cornering
 from weighbridge.balance.filled import Fill, filled, identify_fill
@@ -135,7 +135,7 @@ def force_balance(
         motion=motion,
         brake_hidden=brakes.hidden,
         switch_dead=brakes.switch_dead,
-        retarder_untold=retarder_untold(drive, vehicle),
+        retarder_unreported=retarder_unreported(drive, vehicle),
         coarse_std=coarse_std(source, table.usable),
         air_std=setup.air_std,
         wheel_speed=None if forward else _wheel_speed(drive, motion, table),

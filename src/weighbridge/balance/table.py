@@ -203,7 +203,7 @@ class ForceBalance:
     brake_hidden : the vehicle slows, and no switch, accelerator or floor of the reading shows it
         where it is braked
     switch_dead : the brake switch contradicts the motion and is not used
-    retarder_untold : a retarder may slow the vehicle, unseen in the drive
+    retarder_unreported : a retarder may slow the vehicle, unseen in the drive
     coarse_std : standard deviation by steps of the torque's reading, relative to the mass [-]
     wheel_speed : (n,) speed of the wheels as recorded, at the instants of the rows [m/s]; None for
         stages that go forward, and without one
@@ -219,7 +219,7 @@ class ForceBalance:
     motion: Motion
     brake_hidden: bool = False
     switch_dead: bool = False
-    retarder_untold: bool = False
+    retarder_unreported: bool = False
     coarse_std: float = 0.0
     air_std: float = 0.0
     wheel_speed: Floats | None = None

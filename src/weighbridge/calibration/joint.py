@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from weighbridge.balance.braking import retarder_untold
+from weighbridge.balance.braking import retarder_unreported
 from weighbridge.balance.delay import FARTHEST as FARTHEST_DELAY
 from weighbridge.balance.delay import beyond, vertex
 from weighbridge.calibration.fitted import (
@@ -129,7 +129,7 @@ def _would_help(problem: Problem) -> str:
         lacked.append(phrase("gnss_heights"))
     if any(not d.has("brake_switch") for d in drives):
         lacked.append(phrase("a_brake_switch"))
-    if any(retarder_untold(d, problem.base) for d in drives):
+    if any(retarder_unreported(d, problem.base) for d in drives):
         lacked.append(phrase("retarder_torque"))
     return " or ".join(lacked)
 

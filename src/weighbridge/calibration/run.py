@@ -172,7 +172,7 @@ def run_calibration(
         fitted.vehicle,
         torque=replace(
             fitted.vehicle.torque,
-            told_reference_torque=_stated_reference(recorded, problem),
+            reported_reference_torque=_stated_reference(recorded, problem),
             reading_step=_reading_step(recorded, problem),
         ),
         witnesses=witnesses or fitted.vehicle.witnesses,

@@ -49,7 +49,7 @@ def _check_reference(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]
     reported = reference_torques(reference)
     model = TorqueModel() if vehicle is None else vehicle.torque
     if len(reported) < 2:
-        noted, known = reported[0][0] if reported else None, model.told_reference_torque
+        noted, known = reported[0][0] if reported else None, model.reported_reference_torque
         if noted and known and abs(noted / known - 1.0) > SAME_REFERENCE:
             yield Problem.of(
                 "torque.reference_changed",

@@ -286,8 +286,8 @@ def _say_learnt(results: Path, learn: Path) -> None:
     for row in read_learnt(results).iter_rows(named=True):
         refined = f"refined: {learn / row['refined']}" if row["refined"] else "not refined"
         say(f"{row['vehicle_id']}: {row['drives']} drives with a ticket, {refined}")
-        if row["told"]:
-            say(f"  {row['told']}")
+        if row["findings"]:
+            say(f"  {row['findings']}")
 
 
 def _lonely() -> Callable[[Count], None]:

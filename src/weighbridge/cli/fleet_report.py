@@ -196,7 +196,7 @@ def _say_learnt(learnt: pl.DataFrame) -> None:
     )
     questionable = learnt.filter(learnt["contradicted"] | learnt["drifts"])
     for row in questionable.head(_REPORTED).iter_rows(named=True):
-        say(f"  {row['vehicle_id']}: {row['told']}")
+        say(f"  {row['vehicle_id']}: {row['findings']}")
     more = questionable.height - _REPORTED
     if more > 0:
         say(f"  and {more} more: -o fleet.html has all")

@@ -193,7 +193,7 @@ def _unlearnt(lesson: Lesson, why: str) -> dict[str, Any]:
         "vehicle_id": lesson.assigned.id,
         "drives": len(lesson.drives),
         "weighed": weighed,
-        "told": f"nothing was learnt: {why}",
+        "findings": f"nothing was learnt: {why}",
     }
 
 
@@ -277,7 +277,7 @@ def learn_vehicle(lesson: Lesson) -> dict[str, Any]:
             row["refined"] = name
         except WeighbridgeError as problem:
             reported.append(f"the file cannot be refined: {problem}")
-    return row | {"told": "; ".join(reported)}
+    return row | {"findings": "; ".join(reported)}
 
 
 def chosen(drives: Sequence[Known]) -> list[Known]:

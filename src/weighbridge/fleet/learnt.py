@@ -30,11 +30,14 @@ COLUMNS: Final[dict[str, Any]] = {
     "pitch_drift_deg": pl.Float64,
     "pitch_drift_std_deg": pl.Float64,
     "refined": pl.String,
-    "told": pl.String,
+    "findings": pl.String,
 }
 """Columns of what was learnt of a vehicle: drives with a ticket, those with a mass, how far these
 are from their tickets in the mean (positive: too heavy) and how far they may be; drifts per 30
 days; name of the refined file, and sentences."""
+
+EARLIER: Final = "told"
+"""Name of the findings in a table of earlier versions."""
 
 _DRIFTS: Final = (
     ("torque_drift_pct", "torque_drift_std_pct"),
@@ -64,7 +67,10 @@ def read_learnt(results: str | Path) -> pl.DataFrame:
     path = Path(results) / LEARNT
     try:
         with path.open("rb") as file, quietly():
-            rows = pl.read_parquet(file).select(list(COLUMNS))
+            found = pl.read_parquet(file)
+            if EARLIER in found.columns:
+                found = found.rename({EARLIER: "findings"})
+            rows = found.select(list(COLUMNS))
     except FileNotFoundError:
         rows = pl.DataFrame(schema=COLUMNS)
     except (*PARSE_ERRORS, OSError) as error:

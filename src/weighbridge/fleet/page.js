@@ -362,7 +362,7 @@ function learnt() {
     drift("torque scale, %", "torque_drift_pct", "torque_drift_std_pct", 1),
     drift("rolling", "rolling_drift", "rolling_drift_std", 4),
     drift("pitch, deg", "pitch_drift_deg", "pitch_drift_std_deg", 2),
-    { head: "what was found", value: of(G.told), kind: "w" },
+    { head: "what was found", value: of(G.findings), kind: "w" },
   ], [1, true]);
 }
 

@@ -291,7 +291,7 @@ def _data(report: FleetReport) -> dict[str, Any]:
             report.learnt.filter(pl.col("vehicle_id").is_in(ids)),
             {"verdict": 0, "drives": 0, "error_pct": 1, "error_std_pct": 1, "torque_drift_pct": 1,
              "torque_drift_std_pct": 1, "rolling_drift": 5, "rolling_drift_std": 5,
-             "pitch_drift_deg": 2, "pitch_drift_std_deg": 2, "told": 0},
+             "pitch_drift_deg": 2, "pitch_drift_std_deg": 2, "findings": 0},
         ),
         "verdicts": columns(
             report.verdicts,

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import MISSING, fields
+from dataclasses import MISSING, fields, replace
 from itertools import islice, pairwise
 from pathlib import Path
 from typing import Any, Final, Protocol, TypeVar
@@ -101,9 +101,11 @@ def _values(section: Section, keys: Sequence[Key], faults: Faults) -> dict[str, 
     """Values of the keys that a section has, by their fields; faults are gathered."""
     values = {}
     for key in keys:
-        with faults.gathered():
-            if (value := _value(section, key)) is not None:
-                values[key.field] = value
+        names = (key, replace(key, stem=key.earlier)) if key.earlier else (key,)
+        for named in names:
+            with faults.gathered():
+                if (value := _value(section, named)) is not None:
+                    values[key.field] = value
     return values
 
 

@@ -25,6 +25,7 @@ class Key:
     comment : what stands behind it
     kind : of its value
     pair : whether it is two numbers, the lower first
+    earlier : stem of its name in files of earlier versions
     """
 
     stem: str
@@ -34,6 +35,7 @@ class Key:
     suffix: str = ""
     tail: str = ""
     pair: bool = False
+    earlier: str = ""
 
     @property
     def name(self) -> str:
@@ -144,10 +146,11 @@ SECTIONS: Final[dict[str, tuple[type[Any], tuple[Key, ...]]]] = {
                 suffix="nm",
             ),
             Key(
-                "told_reference_torque",
-                "told_reference_torque",
-                "100 % torque, as the drives of the calibration said it",
+                "reported_reference_torque",
+                "reported_reference_torque",
+                "100 % torque, as the drives of the calibration reported it",
                 suffix="nm",
+                earlier="told_reference_torque",
             ),
             Key(
                 "reading_step",

@@ -38,7 +38,7 @@ class TorqueModel:
         read is interpolated; empty for none [rad/s]
     knot_slopes : that correction at the knots, in the unit of w1
     reference_torque : for "percent" where the drive does not carry it [N m]
-    told_reference_torque : what the drives of the calibration said that 100 % are [N m]
+    reported_reference_torque : what 100 % are, as the drives of the calibration reported it [N m]
     reading_step : step in which the drives of the calibration reported the reading [SI]; None where
         they showed none
     engine_efficiency : for "air_flow", shaft over fuel power [-]
@@ -61,7 +61,7 @@ class TorqueModel:
     knots: tuple[float, ...] = ()
     knot_slopes: tuple[float, ...] = ()
     reference_torque: float | None = None
-    told_reference_torque: float | None = None
+    reported_reference_torque: float | None = None
     reading_step: float | None = None
     engine_efficiency: float = 0.33
     noise: float | None = None
@@ -100,8 +100,8 @@ class TorqueModel:
             within("one of knots and knot_slopes", w, -1e9, 1e9)
         positive("reference_torque", self.reference_torque)
         within("reference_torque", self.reference_torque, 1.0, 1e6, "N m")
-        positive("told_reference_torque", self.told_reference_torque)
-        within("told_reference_torque", self.told_reference_torque, 1.0, 1e6, "N m")
+        positive("reported_reference_torque", self.reported_reference_torque)
+        within("reported_reference_torque", self.reported_reference_torque, 1.0, 1e6, "N m")
         positive("reading_step", self.reading_step)
         within("reading_step", self.reading_step, 1e-12, 1e9)
         positive("noise", self.noise)

@@ -100,7 +100,7 @@ OTHER_RATE_STD: Final = 0.04
 """The same where the torque of the calibration came at another rate, see `sampled_otherwise` [-]:
 of ten trucks of two simulators, 1 Hz with a file of 5 Hz and the other way round."""
 
-UNTOLD_RETARDER_STD: Final = 0.08
+UNREPORTED_RETARDER_STD: Final = 0.08
 """The same of a data sheet alone where a retarder may work that nothing reports [-]: nine drives
 of a simulated truck and bus at 1 Hz came out 9 % light with their retarder logged, 13 % without."""
 
@@ -495,8 +495,8 @@ def _systematic_std(balance: ForceBalance, vehicle: Vehicle, mass: float) -> flo
     if by_data_sheet(vehicle) and balance.motion.source in BY_SPEED:
         if not vehicle.of_class.underpowered:
             left = float(np.hypot(left, UNCALIBRATED_MOTION_STD[balance.motion.source]))
-        if balance.retarder_untold:
-            left = float(np.hypot(left, UNTOLD_RETARDER_STD))
+        if balance.retarder_unreported:
+            left = float(np.hypot(left, UNREPORTED_RETARDER_STD))
     if made.fit is not None and made.fit.torque and not made.fit.refined:
         left = float(np.hypot(left, OTHER_METHOD_STD))
     if not mass > 0.0:

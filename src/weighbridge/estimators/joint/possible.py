@@ -49,11 +49,11 @@ class PossibleChange:
     @property
     def note(self) -> Problem | None:
         """What may be; None where it is improbable."""
-        told = []
+        found = []
         at = []
         if self.probability >= WORTH_TELLING:
             at.append(self.time)
-            told.append(
+            found.append(
                 phrase(
                     "load_may_have_changed",
                     share=100.0 * self.probability,
@@ -64,16 +64,16 @@ class PossibleChange:
             )
         if self.none >= WORTH_TELLING:
             at.append(self.doubtful_time)
-            told.append(
+            found.append(
                 phrase(
                     "load_may_not_have_changed",
                     share=100.0 * self.none,
                     at=instant(float(round(self.doubtful_time))),
                 )
             )
-        if not told:
+        if not found:
             return None
-        return Problem.of("load.possible", start=min(at), end=max(at), told="; ".join(told))
+        return Problem.of("load.possible", start=min(at), end=max(at), found="; ".join(found))
 
 
 class Averaged(NamedTuple):
