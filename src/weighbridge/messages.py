@@ -199,6 +199,11 @@ def _in_shown_units(form: str, values: Mapping[str, Any]) -> tuple[str, dict[str
         return f"{fields} {shown_unit(unit)}"
 
     form = _AMOUNTS.sub(turned, form)
+    for name, value in values.items():
+        if isinstance(value, Phrase):
+            others = _in_shown_units(value.form, value.values)
+            if others is not None:
+                changed[name] = _written(others[0], **others[1])
     return (form, {**values, **changed}) if changed else None
 
 
@@ -215,9 +220,25 @@ def refused(id: str, signal: str = "", /, **values: Any) -> DriveError:
     return Problem.of(id, signal, serious=True, **values).error()
 
 
-def phrase(name: str, /, **values: Any) -> str:
+class Phrase(str):
+    """A part of a sentence, with what it was made of.
+
+    Attributes
+    ----------
+    form : of the catalogue, with its fields in braces
+    values : of the fields
+    """
+
+    form: str
+    values: Mapping[str, Any]
+
+
+def phrase(name: str, /, **values: Any) -> Phrase:
     """Return a part of a sentence, which several messages may share, with these values in it."""
-    return _phrases()[name].format_map(values)
+    form = _phrases()[name]
+    made = Phrase(form.format_map(values))
+    made.form, made.values = form, values
+    return made
 
 
 @cache

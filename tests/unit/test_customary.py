@@ -9,6 +9,7 @@ from tests.unit.test_report import MASS, Elements, make_weighing, written
 
 from weighbridge import ConfigError, Problem
 from weighbridge.customary import shown_amount, shown_in, shown_unit
+from weighbridge.estimators.joint.possible import PossibleChange
 from weighbridge.report import mass_figure
 
 POUND = 0.45359237
@@ -47,6 +48,15 @@ def test_a_message_is_shown_in_pounds_and_written_in_kilograms():
         assert noted("no number").shown == "no number"
     assert problem.shown == problem.text
     assert "1300 kg" in problem.text
+
+
+def test_a_part_of_a_message_is_shown_in_pounds():
+    given = {"time": 60.0, "doubtful_time": 30.0, "none": 0.3}
+    problem = PossibleChange(probability=0.6, difference=500.0, **given).note
+    assert "500 kg" in problem.text
+    with shown_in("us"):
+        assert "1102 lb more" in problem.shown
+        assert "kg" not in problem.shown
 
 
 def test_a_report_in_pounds_names_no_kilogram(tmp_path):

@@ -22,6 +22,7 @@ from tests.unit.test_weighing import weighing as weighed_by_rls
 
 from weighbridge import ConfigError, Drive, DriveInfo, Signal, Weighing, compare
 from weighbridge.balance import ForceBalance, ForceTable, Reason
+from weighbridge.customary import shown_in
 from weighbridge.estimators import ESTIMATORS
 from weighbridge.navigation.geodesy import LocalFrame
 from weighbridge.navigation.motion import Motion
@@ -243,6 +244,18 @@ def against(html, axis):
     mean = next(t for t in figure["data"] if "error_y" in t)
     slow = next(t for t in figure["data"] if t.get("line", {}).get("dash") == "dash")
     return figure, mean, slow
+
+
+def test_sentences_of_forces_and_wind_are_in_pounds_and_miles(tmp_path, round_trip):
+    units = r"\d (?:N m|N|kg|km/h|m/s|km|m)(?![\w/²])"
+    si = Elements(written(tmp_path, [round_trip[0.0]])).text
+    with shown_in("us"):
+        us = Elements(written(tmp_path, [round_trip[0.0]])).text
+    assert len(re.findall(units, si)) > 8
+    assert re.findall(units, us) == []
+    (wind,) = re.findall(r"up to ([\d.]+) m/s", si)
+    (mph,) = re.findall(r"up to ([\d.]+) mph", us)
+    assert float(mph) == pytest.approx(float(wind) * 3600.0 / 1609.344, abs=0.15)
 
 
 def test_residual_is_highest_driving_against_the_wind(tmp_path, round_trip):

@@ -68,7 +68,7 @@ def demo(
             gross=PERMITTED,
         )
         for k, load in enumerate(LOADS, 1):
-            name = f"{load:+.0f} kg"
+            name = f"{shown_amount(load, 'kg'):+.0f} {shown_unit('kg')}"
             bar.begin(f"simulating a drive with {name}")
             chosen = make_scenario("car", payload=load, seed=seed + k)
             chosen = replace(chosen, name=name, duration=DURATION)

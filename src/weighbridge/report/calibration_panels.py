@@ -8,6 +8,7 @@ import numpy as np
 
 from weighbridge.balance import Reason
 from weighbridge.report.style import BLUE, GREY, ORANGE, VERMILLION, Panel, blank, dots, line
+from weighbridge.report.text import amount
 from weighbridge.report.thinning import single, spread, thin_line
 from weighbridge.signals import Floats
 from weighbridge.signals.units import from_si, scalar_from_si
@@ -168,8 +169,8 @@ def agreement_panel(calibration: Calibration) -> Panel:
     line(figure, [low, high], [low, high], "equal", VERMILLION)
     return Panel(
         title=f"Torque from the source against torque from the motion: R² = {rows.r_squared:.3f}",
-        caption=f"Robust standard deviation of the difference: {rows.residual_std:.1f} N m over "
-        f"{source.size} samples.",
+        caption="Robust standard deviation of the difference: "
+        f"{amount(rows.residual_std, 'N m', '.1f')} over {source.size} samples.",
         figure=figure,
     )
 

@@ -29,6 +29,7 @@ from weighbridge.report.style import (
     minutes,
 )
 from weighbridge.report.table import Table
+from weighbridge.report.text import amount
 from weighbridge.report.thinning import thin_line
 from weighbridge.signals import Bools, Floats, Ints
 from weighbridge.signals.units import scalar_from_si, scalar_to_si
@@ -67,7 +68,7 @@ class Manoeuvre(IntEnum):
 
 
 class _Shown(NamedTuple):
-    """How a manoeuvre is shown: name, definition, as a cause, and colour."""
+    """How a manoeuvre is shown: name, definition with ``{launch}``, as a cause, and colour."""
 
     name: str
     definition: str
@@ -76,10 +77,10 @@ class _Shown(NamedTuple):
 
 
 _SHOWN: Final[dict[Manoeuvre, _Shown]] = {
-    Manoeuvre.LAUNCH: _Shown("launch", "speeding up below 30 km/h", "launches", VERMILLION),
+    Manoeuvre.LAUNCH: _Shown("launch", "speeding up below {launch}", "launches", VERMILLION),
     Manoeuvre.AFTER_SHIFT: _Shown(
         "after a shift",
-        f"speeding up within {AFTER_SHIFT:.0f} s of a change of gear, above 30 km/h",
+        f"speeding up within {AFTER_SHIFT:.0f} s of a change of gear, above {{launch}}",
         "speeding up after shifts",
         PURPLE,
     ),
@@ -215,6 +216,7 @@ def information_section(weighing: MassResult) -> Section:
         )
     share = gained.shares(gained.gain)
     time = gained.shares(gained.duration)
+    launch = amount(scalar_from_si(LAUNCH_SPEED, "kmh"), "km/h")
     rows = tuple(
         (
             _SHOWN[m].name,
@@ -222,7 +224,7 @@ def information_section(weighing: MassResult) -> Section:
             f"{100.0 * time[m] / time.sum():.0f} %",
             f"{share[m] / (time[m] / time.sum()):.1f}",
             f"{scalar_from_si(float(time[m]), 'min'):.1f}",
-            _SHOWN[m].definition,
+            _SHOWN[m].definition.format(launch=launch),
         )
         for m in sorted(Manoeuvre, key=lambda m: -share[m])
         if time[m] > 0.0

@@ -10,7 +10,15 @@ import numpy as np
 import plotly.graph_objects as go
 import pymap3d
 
-from weighbridge.report.style import GREEN, GREY, VERMILLION, blank, line
+from weighbridge.customary import shown_amount, shown_unit
+from weighbridge.report.style import (
+    GREEN,
+    GREY,
+    VERMILLION,
+    blank,
+    line,
+    title_in_shown_units,
+)
 from weighbridge.report.thinning import single, spread
 from weighbridge.signals import Bools, Floats
 from weighbridge.signals.units import from_si
@@ -91,11 +99,14 @@ def track_map(track: Positions, tiles: Tiles | None = None) -> go.Figure:
 def _add_scale(figure: go.Figure, track: Positions) -> None:
     """Draw a bar of a round length below the track."""
     east, north = np.ptp(track.east), np.ptp(track.north)
-    widest = 0.35 * max(float(east), float(north), 0.05)
-    length = max(n * 10.0**k for k in range(-3, 4) for n in (1, 2, 5) if n * 10.0**k <= widest)
+    unit = shown_amount(1.0, "km")
+    widest = 0.35 * max(float(east), float(north), 0.05) * unit
+    bar = max(n * 10.0**k for k in range(-3, 4) for n in (1, 2, 5) if n * 10.0**k <= widest)
+    length = bar / unit
     west = float(np.mean((np.min(track.east), np.max(track.east)))) - 0.5 * length
     south = float(np.min(track.north)) - 0.12 * max(float(east), float(north), 0.05)
-    said = f"{length:g} km" if length >= 1.0 else f"{1e3 * length:.0f} m"
+    metres = shown_unit("km") == "km" and length < 1.0
+    said = f"{1e3 * length:.0f} m" if metres else f"{bar:g} {shown_unit('km')}"
     line(
         figure, [west, west + length], [south, south], "scale", GREY, showlegend=False,
         hoverinfo="skip", line_width=4,
@@ -124,6 +135,14 @@ def mark(
     limits : of the scale; those of the values where None
     marker : more of a plotly marker
     """
+    turned = title_in_shown_units(label)
+    if turned is not None:
+        label, unit = turned
+        values = shown_amount(values, unit)
+        limits = (
+            None if limits[0] is None else shown_amount(limits[0], unit),
+            None if limits[1] is None else shown_amount(limits[1], unit),
+        )
     figure.add_scatter(
         x=single(places.east),
         y=single(places.north),

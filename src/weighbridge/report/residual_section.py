@@ -13,6 +13,7 @@ from weighbridge.balance.table import ForceTable
 from weighbridge.estimators import MassTrack
 from weighbridge.report.methods_section import apart, method_style
 from weighbridge.report.style import BLUE, GREY, VERMILLION, Panel, Section, blank, dots, line
+from weighbridge.report.text import amount
 from weighbridge.report.thinning import single, spread
 from weighbridge.signals import Bools, Floats
 from weighbridge.signals.units import from_si
@@ -167,7 +168,7 @@ def _slow_part(result: MassTrack, vehicle: Vehicle) -> str:
 
 
 def _newton(force: float) -> str:
-    return f"{round(force) + 0:+d} N".replace("-", "−").replace("+0 ", "0 ")
+    return amount(force, "N", "+.0f").replace("+0 ", "0 ").replace("−0 ", "0 ")
 
 
 def residual_panel(weighing: MassResult, beside: Sequence[MassResult], against: _Against) -> Panel:

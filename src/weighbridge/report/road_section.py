@@ -21,6 +21,7 @@ from weighbridge.report.style import (
     blank,
     line,
 )
+from weighbridge.report.text import amount
 from weighbridge.report.thinning import spread, thin_line
 from weighbridge.signals import Floats
 from weighbridge.signals.units import from_si
@@ -137,7 +138,7 @@ def pitch_panel(weighing: MassResult, result: MassTrack) -> Panel:
     along, slope = _altitude_slope(motion.distance[known], altitude[known])
     if along.size:
         x, slope_deg = thin_line(from_si(along, "km"), from_si(slope, "deg"))
-        name = f"slope of the altitude over {SLOPE_BASE:.0f} m"
+        name = f"slope of the altitude over {amount(SLOPE_BASE, 'm')}"
         line(figure, x, slope_deg, name, GREEN, yaxis="y2", line_width=1.4,
              meta={"short": "slope of it"})  # fmt: skip
     return Panel(

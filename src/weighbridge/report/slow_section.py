@@ -11,6 +11,7 @@ import numpy as np
 
 from weighbridge.balance.instants import WIND_AT_VEHICLE
 from weighbridge.constants import GRAVITY
+from weighbridge.customary import shown_amount, shown_unit
 from weighbridge.estimators.joint.slow_errors import WIND_STD, SlowErrors
 from weighbridge.report.maps import mark, positions, track_map
 from weighbridge.report.style import (
@@ -28,6 +29,7 @@ from weighbridge.report.style import (
     minutes,
 )
 from weighbridge.report.table import Table
+from weighbridge.report.text import amount
 from weighbridge.report.thinning import SCATTER_POINTS, single, thin_line
 from weighbridge.signals import Bools, Drive, Floats
 from weighbridge.signals.units import from_si, scalar_from_si
@@ -181,7 +183,11 @@ CONSTANTS: Final = {
 def constants_table(slow: SlowErrors) -> Table | None:
     """List what was found beside the mass that does not change over the drive."""
     rows = tuple(
-        (text, *_with_digits(value, REACH * std), unit)
+        (
+            text,
+            *_with_digits(shown_amount(value, unit), shown_amount(REACH * std, unit)),
+            shown_unit(unit),
+        )
         for name, (text, unit) in CONSTANTS.items()
         if name in slow.constants
         for value, std in [slow.constants[name]]
@@ -212,11 +218,11 @@ def force_panel(weighing: MassResult, what: str, causes: str, force: Floats, std
     size = float(np.sqrt(np.mean(force**2)))
     slope = 100.0 * size / (weighing.result.mass * GRAVITY)
     return Panel(
-        title=f"{what}: {size:.0f} N, as a slope of {slope:.2f} %"
+        title=f"{what}: {amount(size, 'N')}, as a slope of {slope:.2f} %"
         if stands_out(force, std)
         else f"{what}: none stands out",
-        caption=f"{size:.0f} N root mean square over the drive; causes are {causes}. Positive "
-        "holds back.",
+        caption=f"{amount(size, 'N')} root mean square over the drive; causes are {causes}. "
+        "Positive holds back.",
         figure=figure,
     )
 
@@ -245,11 +251,12 @@ def wind_panel(weighing: MassResult, wind: Wind, blind: bool) -> Panel:
     figure.add_hline(y=0.0, line={"color": GREY, "width": 1})
     return Panel(
         title=_wind_title(wind),
-        caption="At the height of the vehicle, about half of what a weather report says for 10 m"
+        caption="At the height of the vehicle, about half of what a weather report says for "
+        + amount(10.0, "m")
         + (", which is taken in and dashed" if any(wind.reported) else "")
         + "; bands are of 95 %; a negative line is wind from south or west. Where the vehicle "
         "drives slowly or always one way, the band stays as wide as it was before the drive, "
-        f"± {REACH * WIND_STD:.1f} m/s.",
+        f"± {amount(REACH * WIND_STD, 'm/s', '.1f')}.",
         figure=figure,
     )
 
@@ -308,7 +315,10 @@ def wind_map(weighing: MassResult, wind: Wind, blind: bool, tiles: Tiles | None)
     origin = np.mod(from_si(wind.blows_to[rows], "deg") + 180.0, 360.0)
     dots(
         figure, single(there.east), single(there.north), "wind", BLUE, size=6.0, opacity=1.0,
-        hovertext=[f"{s:.1f} m/s from {o:.0f}°" for s, o in zip(strength, origin, strict=True)],
+        hovertext=[
+            f"{amount(s, 'm/s', '.1f')} from {o:.0f}°"
+            for s, o in zip(strength, origin, strict=True)
+        ],
         hoverinfo="text",
     )  # fmt: skip
     for east, north, speed, to in zip(
@@ -322,7 +332,7 @@ def wind_map(weighing: MassResult, wind: Wind, blind: bool, tiles: Tiles | None)
             showarrow=True, arrowhead=2, arrowsize=1.2, arrowwidth=2, arrowcolor=BLUE,
         )  # fmt: skip
     return Panel(
-        title=f"How the wind blew: up to {float(np.max(strength)):.1f} m/s",
+        title=f"How the wind blew: up to {amount(float(np.max(strength)), 'm/s', '.1f')}",
         caption="Arrows point where the wind goes and end at the place; the longest is the "
         "strongest. They are drawn where the drive shows both components."
         + (f" {tiles.credit}" if tiles is not None else ""),
@@ -337,11 +347,12 @@ def _wind_title(wind: Wind) -> str:
     north, east = float(np.mean(wind.north[wind.seen])), float(np.mean(wind.east[wind.seen]))
     std = float(np.mean(np.hypot(*wind.std[wind.seen].T))) / np.sqrt(2.0)
     strength = float(np.hypot(north, east))
+    size = f"{shown_amount(strength, 'm/s'):.1f} ± {amount(REACH * std, 'm/s', '.1f')}"
     if strength < REACH * std:
-        return f"No wind stands out: {strength:.1f} ± {REACH * std:.1f} m/s on the whole"
+        return f"No wind stands out: {size} on the whole"
     origin = scalar_from_si(float(np.arctan2(east, north)), "deg")
     name = COMPASS[round(origin / 45.0) % 8]
-    return f"Wind from the {name}, {strength:.1f} ± {REACH * std:.1f} m/s on the whole"
+    return f"Wind from the {name}, {size} on the whole"
 
 
 def _evenly(east: Floats, north: Floats) -> Sequence[int]:

@@ -121,15 +121,23 @@ def reason_name(reason: Reason) -> str:
 _AXIS_UNIT: Final = re.compile(r"(.*)\[([^\[\]]+)\]$")
 
 
+def title_in_shown_units(title: str | None) -> tuple[str, str] | None:
+    """Return a title with the unit that is shown, and its own unit; None where nothing changes."""
+    titled = _AXIS_UNIT.fullmatch(title or "")
+    if titled is None or shown_unit(titled[2]) == titled[2]:
+        return None
+    return f"{titled[1]}[{shown_unit(titled[2])}]", titled[2]
+
+
 def in_shown_units(figure: go.Figure) -> go.Figure:
     """Turn the axes of a figure to the units that are shown, with what is drawn along them."""
     for axis in (*figure.select_xaxes(), *figure.select_yaxes()):
         letter, number = axis.plotly_name[0], axis.plotly_name[5:]
-        titled = _AXIS_UNIT.fullmatch(axis.title.text or "")
-        if titled is None or shown_unit(titled[2]) == titled[2]:
+        turned = title_in_shown_units(axis.title.text)
+        if turned is None:
             continue
-        unit, name = titled[2], f"{letter}{number}"
-        axis.title.text = f"{titled[1]}[{shown_unit(unit)}]"
+        axis.title.text, unit = turned
+        name = f"{letter}{number}"
         if axis.range is not None:
             axis.range = [shown_amount(end, unit) for end in axis.range]
         for trace in figure.data:

@@ -19,6 +19,11 @@ NOTHING: Final = "–"
 _OPTION: Final = re.compile(r"(?<!\S)--[a-z][a-z-]*")
 
 
+def amount(value: float, unit: str, form: str = ".0f") -> str:
+    """Print a value in the unit that is shown in place of this one."""
+    return f"{shown_amount(value, unit):{form}} {shown_unit(unit)}".replace("-", "−")
+
+
 def kg(mass: float | None) -> str:
     """Print a mass."""
     if mass is None or not math.isfinite(mass):

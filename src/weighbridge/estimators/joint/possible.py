@@ -73,7 +73,8 @@ class PossibleChange:
             )
         if not found:
             return None
-        return Problem.of("load.possible", start=min(at), end=max(at), found="; ".join(found))
+        said = found[0] if len(found) == 1 else phrase("both", first=found[0], second=found[1])
+        return Problem.of("load.possible", start=min(at), end=max(at), found=said)
 
 
 class Averaged(NamedTuple):
