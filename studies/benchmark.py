@@ -58,22 +58,22 @@ def weigh(folder: Path, wanted: list[str]) -> None:
 
 def table(first: str, named: list[tuple[str, dict]]) -> str:
     """Lay out rows of scores."""
-    lines = [f"| {first} | {' | '.join(HEADS)} |", "|---" + "|---:" * len(HEADS) + "|"]
+    lines = [f"|{first}|{'|'.join(HEADS)}|", "|---" + "|---:" * len(HEADS) + "|"]
     for name, row in named:
         values = [v for k, v in row.items() if k not in ("by", "slice")]
         cells = ["–" if v is None else format(v, f) for v, f in zip(values, FORMS, strict=True)]
-        lines.append(f"| {name} | {' | '.join(cells)} |")
+        lines.append(f"|{name}|{'|'.join(cells)}|")
     return "\n".join(lines) + "\n"
 
 
 def errors(scores: dict[str, list[dict]]) -> str:
     """Lay out the RMS of every method in every slice but those of routes."""
     names = [row["slice"] for row in scores["joint"] if row["by"] not in ("all", "route")]
-    lines = [f"| RMS % | {' | '.join(names)} |", "|---" + "|---:" * len(names) + "|"]
+    lines = [f"|RMS %|{'|'.join(names)}|", "|---" + "|---:" * len(names) + "|"]
     for method, rows in scores.items():
         found = {row["slice"]: row["rms_pct"] for row in rows}
         cells = ["–" if found[name] is None else f"{found[name]:.1f}" for name in names]
-        lines.append(f"| `{method}` | {' | '.join(cells)} |")
+        lines.append(f"|`{method}`|{'|'.join(cells)}|")
     return "\n".join(lines) + "\n"
 
 
@@ -98,7 +98,13 @@ def main() -> None:
     )
     every = table("method", [(f"`{name}`", rows[0]) for name, rows in scores.items()])
     by_slice = errors(scores)
-    slices = table("`joint`, slice", [(row["slice"], row) for row in scores["joint"][1:]])
+    joint = scores["joint"]
+    held = [row["held_pct"] for row in joint[1:]]
+    routes = [row["rms_pct"] for row in joint if row["by"] == "route"]
+    slices = (
+        f"By slice, {min(held):.0f} to {max(held):.0f} % of the intervals of `joint` hold. By "
+        f"route its RMS is {min(routes):.1f} to {max(routes):.1f} %.\n"
+    )
     before, _, rest = PAGE.read_text(encoding="utf-8").partition(BEGIN)
     after = rest.partition(END)[2]
     write_whole(PAGE, f"{before}{BEGIN}\n{said}\n{every}\n{by_slice}\n{slices}\n{END}{after}")

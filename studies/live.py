@@ -160,8 +160,7 @@ def share(flags: list[bool]) -> str:
 def moments(runs: list[Run]) -> list[str]:
     """Tell how good the masses were after some minutes and at the end."""
     lines = [
-        "| after | drives | with a mass | weighed | error RMS % | worst % | held by 95 % "
-        "| median half width % |",
+        "|after|drives|with a mass|weighed|error RMS %|worst %|held by 95 %|median half width %|",
         "|---|---|---|---|---|---|---|---|",
     ]
     for title, all_shown in [
@@ -177,10 +176,10 @@ def moments(runs: list[Run]) -> list[str]:
         errors = np.array([t.error for t in found])
         widths = [196.0 * t.std / t.mass for t in found]
         lines.append(
-            f"| {title} | {len(all_shown)} | {len(found)} "
-            f"| {sum(t.status == 'weighed' for t in found)} "
-            f"| {np.sqrt(np.mean(errors**2)):.2f} | {errors[np.argmax(np.abs(errors))]:+.1f} "
-            f"| {share([t.holds for t in found])} | {np.median(widths):.1f} |"
+            f"|{title}|{len(all_shown)}|{len(found)}"
+            f"|{sum(t.status == 'weighed' for t in found)}"
+            f"|{np.sqrt(np.mean(errors**2)):.2f}|{errors[np.argmax(np.abs(errors))]:+.1f}"
+            f"|{share([t.holds for t in found])}|{np.median(widths):.1f}|"
         )
     return lines
 
@@ -214,24 +213,6 @@ def beside_batch(runs: list[Run]) -> str:
     return text
 
 
-def table(runs: list[Run]) -> list[str]:
-    lines = [
-        "| drive | true at the end kg | recorded % | live at the end % | after 5 min % |",
-        "|---|---|---|---|---|",
-    ]
-    for r in runs:
-        five = r.after.get(5.0)
-        lines.append(
-            f"| {r.name} | {r.end.true:.0f} | {_percent(100.0 * (r.batch / r.end.true - 1.0))} "
-            f"| {_percent(r.end.error)} | {_percent(five.error) if five else '–'} |"
-        )
-    return lines
-
-
-def _percent(value: float) -> str:
-    return f"{value:+.1f}" if math.isfinite(value) else "none"
-
-
 def page(ours: list[Run], theirs: list[Run]) -> str:
     """Fill the template."""
     absent = "The drives are not here."
@@ -239,12 +220,10 @@ def page(ours: list[Run], theirs: list[Run]) -> str:
         "second_first": first_mass(ours),
         "second_moments": "\n".join(moments(ours)),
         "second_batch": beside_batch(ours),
-        "second_table": "\n".join(table(ours)),
         "second_withdrawn": str(sum(r.withdrawn > 0 for r in ours)),
         "foreign_first": first_mass(theirs) if theirs else "",
         "foreign_moments": "\n".join(moments(theirs)) if theirs else absent,
         "foreign_batch": beside_batch(theirs) if theirs else "",
-        "foreign_table": "\n".join(table(theirs)) if theirs else "",
     }
     text = (HERE / "live.template.md").read_text(encoding="utf-8")
     for key, value in filled.items():

@@ -137,7 +137,7 @@ def table(found: list[list[Weighing]]) -> list[str]:
     mean comes from the means of the vehicles.
     """
     lines = [
-        "| method | weighed | RMS % | mean % | worst % | 95 % intervals that hold | (error/std)² |",
+        "|method|weighed|RMS %|mean %|worst %|95 % intervals that hold|(error/std)²|",
         "|---|---|---|---|---|---|---|",
     ]
     for method, name in METHODS.items():
@@ -150,9 +150,9 @@ def table(found: list[list[Weighing]]) -> list[str]:
         ]
         mean_std = np.nanstd(by_vehicle, ddof=1) / np.sqrt(len(found))
         lines.append(
-            f"| {name} | {len(part)} of {len(every)} | {np.sqrt(np.mean(error**2)):.2f} "
-            f"| {np.mean(error):+.2f} ± {mean_std:.2f} | {np.max(np.abs(error)):.1f} "
-            f"| {100.0 * np.mean(np.abs(scaled) < 1.96):.0f} % | {np.mean(scaled**2):.2f} |"
+            f"|{name}|{len(part)} of {len(every)}|{np.sqrt(np.mean(error**2)):.2f}"
+            f"|{np.mean(error):+.2f} ± {mean_std:.2f}|{np.max(np.abs(error)):.1f}"
+            f"|{100.0 * np.mean(np.abs(scaled) < 1.96):.0f} %|{np.mean(scaled**2):.2f}|"
         )
     return [*lines, ""]
 

@@ -39,7 +39,7 @@ tests.licences` writes it.
 
 A package that needs further packages is not followed. `pip install pip-licenses` lists those.
 
-| package | licence | needed by |
+|package|licence|needed by|
 |---|---|---|
 """
 
@@ -49,10 +49,10 @@ code of theirs is in it.
 
 ## In the package itself
 
-| what | licence | where |
+|what|licence|where|
 |---|---|---|
-| uPlot | MIT | the page of `weighbridge live`: `live/outputs/static/uplot/` |
-| plotly.js | MIT | the reports, which hold a copy: `report/plotly/` |
+|uPlot|MIT|the page of `weighbridge live`: `live/outputs/static/uplot/`|
+|plotly.js|MIT|the reports, which hold a copy: `report/plotly/`|
 """
 
 
@@ -86,9 +86,9 @@ def licence(name: str) -> str:
 def page() -> str:
     """Write the page, of the packages that are installed."""
     rows = (
-        f"| {name} | {licence(name)} | "
+        f"|{name}|{licence(name)}|"
         + ("every command" if "" in extras else ", ".join(f"`{e}`" for e in extras))
-        + " |\n"
+        + "|\n"
         for name, extras in needed().items()
     )
     return HEAD + "".join(rows) + TAIL

@@ -243,7 +243,7 @@ class Section:
         lines = [f"{self.note}: {said}.", ""]
         exact = [r.label for r in part[Verdict.AGREES] if r.tolerance == EXACT]
         if exact:
-            lines += ["Agree to rounding:", "", *(f"- {label}" for label in exact), ""]
+            lines += ["Agree to rounding:", "", *(f"- {item}" for item in _ranges(exact)), ""]
         agree = [r for r in part[Verdict.AGREES] if r.tolerance != EXACT]
         lines += _table(
             ("agrees", "printed", "ours"), _shared([(r.label, *r.figures) for r in agree])
@@ -265,6 +265,21 @@ class Section:
             ("not reproducible", "why"), [(", ".join(of), why) for why, of in drawn.items()]
         )
         return "\n".join(lines).rstrip() + "\n"
+
+
+def _ranges(labels: Sequence[str]) -> list[str]:
+    """Write items that follow each other as one: "eq. 1–5"."""
+    written: list[str] = []
+    kind, last = "", -1
+    for label in labels:
+        name, _, number = label.rpartition(" ")
+        follows = number.isdecimal() and name == kind and int(number) == last + 1
+        if follows:
+            written[-1] = f"{written[-1].partition('–')[0]}–{number}"
+        else:
+            written.append(label)
+        kind, last = (name, int(number)) if number.isdecimal() else ("", -1)
+    return written
 
 
 def _shared(rows: Sequence[tuple[str, ...]]) -> list[tuple[str, ...]]:
