@@ -344,6 +344,7 @@ def test_simulate_writes_a_folder_once(weighbridge, tmp_path):
     [
         (["moon"], "moon car-short"),
         (["hihgway"], "did you mean highway?"),
+        (["fleets"], "Did you mean 'fleet'?"),
         (["car-short", "--without", "friction"], "friction tyre_speed"),
         (["car-short", "--without", "sqat"], "did you mean squat?"),
         (["car-short", "--format", "xlsx"], "parquet or csv"),

@@ -36,8 +36,17 @@ class RunsDrives(TyperGroup):
         return self.commands[_RUN]
 
     def parse_args(self, ctx: Any, args: list[str]) -> Any:
-        """Put the name of the command in front where none is."""
+        """Put the name of the command in front where none is.
+
+        A word that is nearly a command and no path is refused.
+        """
         if not args or args[0] not in self.commands:
+            from weighbridge.arguments import near_miss
+
+            word = args[0] if args else ""
+            meant = near_miss(word, set(self.commands) - {_RUN}) if word.isalpha() else ""
+            if meant and not Path(word).exists():
+                ctx.fail(f"No such command {word!r}. Did you mean {meant!r}?")
             args = [_RUN, *args]
         return super().parse_args(ctx, args)
 
