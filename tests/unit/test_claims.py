@@ -120,7 +120,7 @@ def test_bars_stay_in_their_cell_of_the_page():
     (line,) = (line for line in page.splitlines() if line.startswith("|table 4"))
     assert line.count("|") - line.count("\\|") == len(("row", "printed", "ours")) + 1
     assert "3 % \\| 1 %" in line
-    assert "seeds 5 to 6: 2 agrees, 0 differs, 1 not reproducible." in page
+    assert "Seeds 5 to 6: agrees 2, differs 0, not reproducible 1." in page
 
 
 @pytest.mark.parametrize("paper", PAPERS)

@@ -174,7 +174,7 @@ def _unjudged(report: FleetReport) -> str:
     if report.unjudged.is_empty():
         return '<section id="unjudged"><h3>Not judged</h3><p>All legs were judged.</p></section>'
     rows = "".join(
-        f"<tr><td>{row['prevents']}</td><td>{escape(_cut(row['example'] or NOTHING))}</td>"
+        f"<tr><td>{row['prevents']}</td><td class=w>{escape(_cut(row['example'] or NOTHING))}</td>"
         f"<td class=n>{row['count']}</td><td class=n>{_share(row['share'])}</td>"
         f"<td class=n>{_number(row['distance_km'])}</td>"
         f"<td>{_text(some(row['vehicles']))}</td></tr>"
@@ -183,8 +183,8 @@ def _unjudged(report: FleetReport) -> str:
     return (
         '<section id="unjudged"><h3>Not judged</h3><p class="lead">Legs of which mass, overload or '
         'payload is not known, and why. What prevents a mass comes first.</p><div class="scroll">'
-        "<table><thead><tr><th>not known<th>why<th class=n>legs<th class=n>of all<th class=n>km"
-        f"<th>vehicles</tr></thead><tbody>{rows}</tbody></table></div></section>"
+        "<table><thead><tr><th>not known<th class=w>why<th class=n>legs<th class=n>of all"
+        f"<th class=n>km<th>vehicles</tr></thead><tbody>{rows}</tbody></table></div></section>"
     )
 
 
@@ -303,7 +303,7 @@ def _data(report: FleetReport) -> dict[str, Any]:
 
 def _cut(text: str) -> str:
     text = visible(text)
-    return text if len(text) <= _LONGEST else text[:_LONGEST] + " …"
+    return text if len(text) <= _LONGEST else text[:_LONGEST].rpartition(" ")[0] + " …"
 
 
 def _without(vehicles: list[str | None]) -> str:

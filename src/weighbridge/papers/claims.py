@@ -12,6 +12,7 @@ import numpy as np
 
 from weighbridge.errors import ConfigError
 from weighbridge.report.table import Table
+from weighbridge.report.text import capital
 from weighbridge.signals import Floats
 
 COLUMNS: Final = (
@@ -239,8 +240,8 @@ class Section:
         Equations that agree to rounding are named together; the rest of a row is in its record.
         """
         part = {v: [r for r in self.rows if r.verdict is v] for v in Verdict}
-        said = ", ".join(f"{len(rows)} {verdict}" for verdict, rows in part.items())
-        lines = [f"{self.note}: {said}.", ""]
+        said = ", ".join(f"{verdict} {len(rows)}" for verdict, rows in part.items())
+        lines = [f"{capital(self.note)}: {said}.", ""]
         exact = [r.label for r in part[Verdict.AGREES] if r.tolerance == EXACT]
         if exact:
             lines += ["Agree to rounding:", "", *(f"- {item}" for item in _ranges(exact)), ""]

@@ -67,8 +67,11 @@ function range() {
     low = Math.min(low, last[0]);
     high = Math.max(high, last[1]);
   }
-  const near = limit !== null && limit < 1.25 * high;
-  if (near) high = Math.max(high, limit);
+  const near = limit !== null && limit < 1.25 * high && limit > 0.75 * low;
+  if (near) {
+    low = Math.min(low, limit);
+    high = Math.max(high, limit);
+  }
   at("limit-key").hidden = !near;
   const pad = Math.max(0.15 * (high - low), 0.02 * high);
   return [Math.max(low - pad, 0) * unit.per, (high + pad) * unit.per];
