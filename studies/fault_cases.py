@@ -25,7 +25,7 @@ from weighbridge.pipeline.weighing import Weighing, weigh
 from weighbridge.signals import Drive
 from weighbridge.vehicle.model import Vehicle
 
-KINDS: Final = ("right", "told", "silent", "refused", "traceback", "hang", "memory")
+KINDS: Final = ("right", "reported", "silent", "refused", "traceback", "hang", "memory")
 """What can come of a case."""
 
 NEAR: Final = 0.02
@@ -265,7 +265,7 @@ def judge(case: Case, subject: Subject, weighing: Weighing, shared: Sequence[str
     # A payload that may be nothing need not be told; one that is unknown counts as impossible.
     possible = weighing.payload > -FAR_STD * weighing.std
     if case.must_tell and not warning and not possible:
-        return Outcome(case, method, "silent", error, std, "nothing is told of it")
-    kind = "right" if right else "told" if warning else "silent"
+        return Outcome(case, method, "silent", error, std, "nothing reports it")
+    kind = "right" if right else "reported" if warning else "silent"
     wider = weighing.std / subject.stds[method]
     return Outcome(case, method, kind, error, std, warning, wider=wider)

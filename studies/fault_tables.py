@@ -25,7 +25,7 @@ def tables(
         "groups, all methods": groups(outcomes),
         "methods": methods(outcomes),
         "silently wrong": wrong(outcomes, "silent"),
-        "told and wrong": wrong(outcomes, "told"),
+        "reported and wrong": wrong(outcomes, "reported"),
         "broken": broken(outcomes),
         "refusals": refusals(outcomes),
         "harmless": harmless(outcomes),

@@ -385,7 +385,7 @@ def bmw_i3() -> str:
         mass: wb.calibrate(known, mass=mass, vehicle=car, settings=SPEED_EKF) for mass in told
     }
     lines = [
-        "| trip | min | samples used | told 1270 kg | told 1580 kg | follows the start by "
+        "| trip | min | samples used | given 1270 kg | given 1580 kg | follows the start by "
         "| as printed, from 1500 kg | from nothing, grade level | status |",
         "|---|---|---|---|---|---|---|---|---|",
     ]
@@ -414,8 +414,8 @@ def bmw_i3() -> str:
     lines += [
         "",
         f"The fit to {drives[0].name} explains {100 * r_squared:.0f} % of the changes of speed. "
-        f"Told 1270 kg of that trip, the filter ends between {a.min():.0f} and {a.max():.0f} kg; "
-        f"told 1580 kg, between {b.min():.0f} and {b.max():.0f} kg. "
+        f"Given 1270 kg of that trip, the filter ends between {a.min():.0f} and {a.max():.0f} kg; "
+        f"given 1580 kg, between {b.min():.0f} and {b.max():.0f} kg. "
         f"{sum(1 for _ in drives)} trips, none of which `weigh` calls weighed.",
     ]
     return "\n".join(lines)

@@ -54,7 +54,7 @@ MAP_LENGTH: Final = 100.0
 """Way over which that error lasts [m], chosen."""
 
 HEAD: Final = (
-    "| drives | method | weighed | RMS % | mean % | worst % | told, median ± % | within it |\n"
+    "| drives | method | weighed | RMS % | mean % | worst % | reported, median ± % | within it |\n"
     "|---|---|---|---|---|---|---|---|"
 )
 

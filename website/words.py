@@ -12,15 +12,14 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from website import links
+
 HOME = Path(__file__).parents[1]
 SOURCE = HOME / "src" / "weighbridge"
 INSTEAD: dict[str, str] = tomllib.loads(
     (HOME / "website" / "words.toml").read_text(encoding="utf-8")
 )
 """Expressions of private words, with what to write in their place."""
-
-UNTOUCHED = ("io", "signals")
-"""Rooms whose sentences are not read yet."""
 
 _PRIVATE = re.compile("|".join(rf"(?<![.\w])(?:{word})\b" for word in INSTEAD), re.IGNORECASE)
 _CODE = re.compile(r"``[^`]+``|`[^`\n]+`|\]\([^)\s]*\)|https?://\S+")
@@ -35,10 +34,10 @@ def private_words(text: str) -> list[tuple[int, str]]:
 
 
 def pages() -> Iterator[tuple[str, str]]:
-    """Yield place and text of what people read: docs, README, messages, and pages of results."""
+    """Yield place and text of what people read: pages of the site, messages, pages of results."""
     shown = (p for p in SOURCE.rglob("*") if p.suffix in (".toml", ".html", ".js", ".css"))
-    written = (HOME / "docs").rglob("*.md")
-    for path in sorted([HOME / "README.md", HOME / "CHANGELOG.md", *written, *shown]):
+    examples = (HOME / "examples").rglob("*.toml")
+    for path in sorted({*links.pages(), *examples, *shown}):
         text = path.read_text(encoding="utf-8")
         if path.suffix == ".toml":
             text = _VALUE.sub("", text)
@@ -47,7 +46,7 @@ def pages() -> Iterator[tuple[str, str]]:
 
 def sentences() -> Iterator[tuple[str, str]]:
     """Yield place and text of the literals of the program that have a blank: its sentences."""
-    for path in sorted(p for p in SOURCE.rglob("*.py") if p.parent.name not in UNTOUCHED):
+    for path in sorted(SOURCE.rglob("*.py")):
         tree = ast.parse(path.read_text(encoding="utf-8"))
         described = {
             id(line.value)
@@ -71,8 +70,7 @@ def references() -> Iterator[tuple[str, str]]:
         for name in re.findall(r"^::: (\S+)", page, re.MULTILINE):
             home, _, last = name.rpartition(".")
             public = getattr(import_module(home), last)
-            if not {*getattr(public, "__module__", "").split(".")} & {*UNTOUCHED}:
-                yield from _docstrings(name, public)
+            yield from _docstrings(name, public)
 
 
 def found() -> Iterator[tuple[str, int, str]]:

@@ -307,7 +307,7 @@ def test_rows_that_are_counted_are_a_clock_once_their_rate_is_known(tmp_path):
     found = draft(path)
     assert found.time == "Sample"
     assert found.rate_unknown
-    assert "does not tell how many there are per second" in found.questions[0]
+    assert "does not state how many there are per second" in found.questions[0]
     mapping = tmp_path / "map.toml"
     mapping.write_text(mapping_text([found]), encoding="utf-8")
     with pytest.raises(ConfigError, match="rate_hz is not known yet: write how many rows"):
@@ -385,7 +385,7 @@ def test_the_speed_of_a_table_with_positions_is_doubted_where_its_name_does_not_
     for name, doubts in (("Speed", True), ("GPS Speed", False), ("OBD Speed", False)):
         head = f"Time (s),{name} (km/h),Latitude (deg),Longitude (deg),Engine RPM"
         found = draft(written(tmp_path / "x.csv", [head, *rows]))
-        assert any("does not tell which" in d for d in found.all_questions) == doubts
+        assert any("does not say which" in d for d in found.all_questions) == doubts
     head = "Time (s),Speed (km/h),Latitude (deg),Longitude (deg),comment"
     # Of a table that has nothing else of the vehicle it is the satellites'.
     found = draft(written(tmp_path / "x.csv", [head, *rows]))

@@ -80,7 +80,7 @@ def test_wrong_mass_is_silent_unless_a_warning_names_the_fault(car):
     assert set(kinds_of(run_case(one(untouched), heavy)).values()) == {"silent"}
     assert set(kinds_of(run_case(one(named), heavy)).values()) == {"silent"}
     outcomes = run_case(one(named, words="soft"), heavy)
-    assert set(kinds_of(outcomes).values()) == {"told"}
+    assert set(kinds_of(outcomes).values()) == {"reported"}
     assert {o.text for o in outcomes} == {"the sensor has gone soft"}
     assert outcomes[0].error == pytest.approx(-0.5, abs=0.05)
 
@@ -98,7 +98,7 @@ def test_of_a_pair_each_fault_that_spoils_the_mass_must_be_named(car):
     assert set(kinds_of(run_case(both, heavy)).values()) == {"silent"}
     meek = replace(quiet, harmless=True)
     assert set(kinds_of(run_case(Case(((soft, 1.0), (meek, 1.0)), "car"), heavy)).values()) == {
-        "told"
+        "reported"
     }
     # The one that is not named leaves the mass alone right: it is none of the reasons.
     assert telling(both, car, ["the sensor has gone soft"], "joint") == "the sensor has gone soft"

@@ -135,7 +135,7 @@ def speed_checked(columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, ...]:
     speeds = [c for c in columns if c.quantity in _SPEEDS]
     if len(speeds) != 1 or _TELLING & set(words_of(speeds[0].name)):
         return columns
-    question = f"taken for {_SPEEDS[speeds[0].quantity]}; its name does not tell which"
+    question = f"taken for {_SPEEDS[speeds[0].quantity]}; its name does not say which"
     return tuple(
         replace(c, question=f"{c.question}; {question}" if c.question else question, unsure=True)
         if c is speeds[0]

@@ -261,7 +261,7 @@ def _counted(raw: RawTable, rate: float) -> DraftTime:
     rows = raw.numbers(index)[0] if index >= 0 else np.arange(raw.rows, dtype=np.float64)
     what = f"{name!r} counts rows" if name else "no column can be its time"
     question = (
-        f"{what}, and the log does not tell how many there are per second: state rate_hz in [time]"
+        f"{what}, and the log does not state how many there are per second: state rate_hz in [time]"
         if np.isnan(rate)
         else f"{what}; {rate:g} per second, as a line above the header states"
     )

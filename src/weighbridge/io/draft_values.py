@@ -273,7 +273,7 @@ def _found_by_values(
     if not fitting or not _alike([values for _, values in fitting]):
         return columns
     taken_for, values = fitting[0]
-    found = _taken(taken_for, quantity, values, "its name does not tell, but how it moves does")
+    found = _taken(taken_for, quantity, values, "its name does not show it, but how it moves does")
     found = replace(found, stated=bool(reported[taken_for.name].unit))
     return tuple(found if c is taken_for else c for c in columns)
 

@@ -97,7 +97,7 @@ def _signal(column: DraftColumn) -> Table:
     seen = f"{quantity.meaning}; {column.low:.4g} to {column.high:.4g}"
     table.add(tomlkit.comment(visible(f"{seen} {column.unit}".rstrip())))
     if column.question:
-        table.add(tomlkit.comment(visible(f"doubtful: {column.question}")))
+        table.add(tomlkit.comment(visible(f"uncertain: {column.question}")))
     table.add("column", column.name)
     if column.unit:
         table.add("unit", column.unit)
