@@ -89,7 +89,7 @@ def test_a_report_as_markdown_has_the_rows_of_every_paper(weighbridge, tmp_path,
     assert weighbridge("reproduce", "all", "--report", page).code == 0
     text = page.read_text(encoding="utf-8")
     assert text.count("## A paper\n") == 4
-    assert "seeds 5 to 6" in text
+    assert "Seeds 5 to 6" in text
     assert "|table 2, RMSE of all|1 kg|2 kg|" in text
     again = weighbridge("reproduce", "all", "--report", page)
     assert again.code == 0
