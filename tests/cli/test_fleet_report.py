@@ -74,7 +74,9 @@ def test_what_was_learnt_is_told_those_to_look_at_first(weighbridge, results, tm
     rows = [
         lesson("truck3", torque_drift_pct=2.0, torque_drift_std_pct=0.7, findings=""),
         lesson("gone", rolling_drift=float("nan"), rolling_drift_std=float("nan"), findings=""),
-        lesson("truck1", pitch_drift_deg=-0.4, pitch_drift_std_deg=0.1, findings="the pitch drifts"),
+        lesson(
+            "truck1", pitch_drift_deg=-0.4, pitch_drift_std_deg=0.1, findings="the pitch drifts"
+        ),
         lesson(HOSTILE, contradicted=True, error_pct=12.0, findings="5 drives contradict the file"),
     ]
     write_learnt(results, rows)

@@ -26,7 +26,8 @@ def weighed(std, systematic=math.nan, vehicle=VEHICLE, method="joint", **changed
 
 def block(tmp_path, weighing, **options):
     html = written(tmp_path, [weighing], **options)
-    return html[html.index('<div class="verdict') : html.index("<h3>")]
+    shown = html[html.index('<div class="verdict') : html.index("<h3>")]
+    return shown.replace("\u00a0", " ")
 
 
 @pytest.mark.parametrize(

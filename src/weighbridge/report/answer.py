@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass
 from html import escape
 from typing import TYPE_CHECKING, Final
@@ -320,6 +321,8 @@ def _share(answer: Answer) -> str:
 
 def _item(name: str, text: str, value: str = "", more: str = "") -> str:
     strong = f"<strong>{escape(value)}</strong> " if value else ""
+    # A line never breaks between a number and its sign or unit.
+    text = re.sub(r"(?<=\d) (?=(?:%|kg|lb)\b|%)|(?<=±) ", "\u00a0", text)
     return f"<div><dt>{name}</dt><dd>{strong}{prose(text)}{more}</dd></div>"
 
 
