@@ -223,6 +223,26 @@ def test_thin_air_is_no_fault(normalised):
     assert doubts_of(high, car) == ()
 
 
+@pytest.mark.parametrize(
+    ("pressure", "known", "scale", "explained"),
+    [
+        # Air of 0.8 bar lets the engine take up to 1 / 0.8 of the load, and no less of it.
+        (0.8e5, True, 0.9, False),
+        (0.8e5, True, 1.2, True),
+        (0.8e5, True, 1.3, False),
+        (1.0e5, True, 0.93, False),
+        (1.0e5, False, 0.93, True),
+        (1.0e5, False, 1.07, True),
+    ],
+)
+def test_air_accounts_for_no_more_than_it_can(pressure, known, scale, explained):
+    made = changed(
+        drive(20, pressure=pressure), "engine_load", lambda t, x: np.minimum(scale * x, 1.0)
+    )
+    made = made if known else replace(made, info=DriveInfo())
+    assert (doubts_of(made, learnt("mass_air_flow")) == ()) == explained
+
+
 def test_delays_gaps_jitter_and_dropouts_are_no_fault():
     random = np.random.default_rng(7)
     made = drive(20)
