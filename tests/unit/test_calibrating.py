@@ -12,6 +12,7 @@ from tests.noted import error, refused, says
 
 from weighbridge import CalibrationSettings, ConfigError, Signal, Vehicle, calibrate, weigh
 from weighbridge.balance import force_balance
+from weighbridge.balance.law import force_on_mass, mass_column
 from weighbridge.calibration import self_weighing
 from weighbridge.calibration.printed import TrainingSettings
 from weighbridge.calibration.run import (
@@ -20,7 +21,6 @@ from weighbridge.calibration.run import (
     unfound_gears,
 )
 from weighbridge.cli.calibrate import speed_table, table
-from weighbridge.estimators.regression import regression
 from weighbridge.report.calibration_panels import calibration_facts
 from weighbridge.simulation import (
     Scenario,
@@ -596,7 +596,8 @@ def test_the_rows_shown_are_those_of_the_vehicle_saved(empty, fitted, tmp_path, 
     np.testing.assert_allclose(
         done.rows.source_torque, balance.table.torque[index], rtol=5e-4, atol=0.02
     )
-    phi, rest = regression(table, Vehicle.load(tmp_path / "car.toml"))
+    saved = Vehicle.load(tmp_path / "car.toml")
+    phi, rest = mass_column(table, saved), force_on_mass(table, saved)
     mass = empty.drive.info.mass - table.fuel_burnt
     taken = (mass * phi + table.traction_force - rest) / table.gearing
     np.testing.assert_allclose(done.rows.motion_torque, taken[index], rtol=5e-4, atol=0.05)
