@@ -101,14 +101,14 @@ def test_gnss_speed_does_as_well(car):
     assert found.result.mass == wb.weigh(made, car, method="speed-ekf").result.mass
 
 
-def test_a_start_that_is_forgotten_gives_a_mass_with_its_interval(car, monkeypatch):
-    # Not what recorded cars do: the paths beyond the refusal are tried on their own.
-    monkeypatch.setattr("weighbridge.estimators.speed_ekf.start_share", lambda *_: 0.1)
-    doubtful = wb.weigh(drive(2), car, method="speed-ekf")
+def test_a_start_that_is_forgotten_gives_a_mass_with_its_interval(car):
+    # Not what recorded cars do: the paths beyond the refusal are tried by settings.
+    forgets = {"initial_var": (1e-4, 1e-6, 1e-6), "process_var": (1e-3, 1e-14, 1e-8)}
+    doubtful = wb.weigh(drive(2), car, method="speed-ekf", settings=forgets)
     assert doubtful.status == "not_excited"
     assert doubtful.reason_id == "speed.wide"
     sure = replace(car, speed_model=replace(car.speed_model, scale_std=0.1))
-    weighed = wb.weigh(drive(2), sure, method="speed-ekf")
+    weighed = wb.weigh(drive(2), sure, method="speed-ekf", settings=forgets)
     low, high = weighed.interval(0.95)
     assert weighed.status == "converged"
     assert high - low > 0.35 * weighed.mass
