@@ -1,14 +1,17 @@
 """Calibration on simulated drives: what it finds, what it refuses."""
 
+import re
 import tomllib
 from dataclasses import replace
 from functools import cache
+from html import unescape
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from numba import config
 from tests.noted import error, refused, says
+from tests.unit.test_report import written
 
 from weighbridge import CalibrationSettings, ConfigError, Signal, Vehicle, calibrate, weigh
 from weighbridge.balance import force_balance
@@ -21,7 +24,6 @@ from weighbridge.calibration.run import (
     unfound_gears,
 )
 from weighbridge.cli.calibrate import speed_table, table
-from weighbridge.report.calibration_panels import calibration_facts
 from weighbridge.simulation import (
     Scenario,
     Sensors,
@@ -560,7 +562,10 @@ def test_report_terminal_and_file_tell_the_same(fitted, tmp_path, method):
     done = fitted(method)
     done.vehicle.save(tmp_path / "car.toml")
     saved = tomllib.loads((tmp_path / "car.toml").read_text(encoding="utf-8"))
-    report = dict(calibration_facts(done))
+    page = written(tmp_path, [], calibration=done)
+    report = {
+        unescape(k): unescape(v) for k, v in re.findall(r"<dt>(.*?)</dt><dd>(.*?)</dd>", page)
+    }
     shown = {name: (value, std) for name, value, std in cells(table(done))}
     told = {**{k: v for k, v in saved["torque"].items() if k == "coefficients"}}
     for name, (section, key, std_key) in FILE_KEYS.items():
