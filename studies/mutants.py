@@ -134,6 +134,62 @@ MUTANTS = (
         "a unit",
         ("tests/unit/test_report_figures.py",),
     ),
+    Mutant(
+        "report/thinning.py",
+        "breaks = np.flatnonzero(np.diff(missing[index])) + 1",
+        "breaks = np.flatnonzero(np.diff(missing[index])) - 1",
+        "a gap in the wrong place",
+        ("tests/unit/test_report_figures.py",),
+    ),
+    Mutant(
+        "report/residual_section.py",
+        "SMALLEST * x.size)",
+        "SMALLEST / x.size)",
+        "a limit",
+        ("tests/unit/test_report_sections.py",),
+    ),
+    Mutant(
+        "report/maps.py",
+        "south = float(np.min(track.north)) - 0.12",
+        "south = float(np.min(track.north)) + 0.12",
+        "a sign",
+        ("tests/unit/test_report_figures.py",),
+    ),
+    Mutant(
+        "report/information_section.py",
+        "np.log10(0.8 * low)",
+        "np.log10(1.8 * low)",
+        "a factor",
+        ("tests/unit/test_report_sections.py",),
+    ),
+    Mutant(
+        "balance/floor.py",
+        "return replace(self, level=self.level + least) if least > DRIFT * self.span else self",
+        "return self",
+        "a step left out",
+        ("tests/unit/test_foot.py",),
+    ),
+    Mutant(
+        "balance/speed_balance.py",
+        "count = int((motion.time[-1] - motion.time[0] + 1.0 / motion.rate) / length + 1e-9)",
+        "count = int((motion.time[-1] - motion.time[0] - 1.0 / motion.rate) / length + 1e-9)",
+        "a row dropped",
+        ("tests/unit/test_speed_ekf.py",),
+    ),
+    Mutant(
+        "estimators/speed_ekf.py",
+        "spread = np.array([np.std(part) for part in parts])",
+        "spread = np.array([np.ptp(part) for part in parts])",
+        "another spread",
+        ("tests/unit/test_speed_ekf.py",),
+    ),
+    Mutant(
+        "estimators/speed_ekf.py",
+        "return (ends[1] - ends[0]) / (starts[1] - starts[0])",
+        "return (ends[1] - ends[0]) * (starts[1] - starts[0])",
+        "a unit",
+        ("tests/unit/test_speed_ekf.py",),
+    ),
 )
 
 

@@ -1,6 +1,7 @@
 """Which tests run first, and which only when asked for.
 
-Long files start first, and `.ci/quick` takes what fits. Tests of `long.toml` run with ``--long``.
+Files that start other programs come first, then long ones. `.ci/quick` takes what fits. Tests of
+`long.toml` run with ``--long``.
 
 ``pytest --junitxml=build/tests.xml`` and then ``python -m tests.order build/tests.xml`` write
 the list again.
@@ -28,9 +29,22 @@ def seconds() -> dict[str, float]:
 
 
 def longest_first(items: list) -> None:
-    """Put the tests of new and of long files first; within a file the order stays."""
+    """Put the tests of new and of long files first; within a file the order stays.
+
+    Before them come files that start other programs, while the workers themselves are small.
+    """
     known = seconds()
-    items.sort(key=lambda item: -known.get(item.path.relative_to(ROOT).as_posix(), math.inf))
+    starting = {
+        item.path
+        for item in items
+        if "browser" in item.fixturenames or hasattr(item.module, "subprocess")
+    }
+    items.sort(
+        key=lambda item: (
+            item.path not in starting,
+            -known.get(item.path.relative_to(ROOT).as_posix(), math.inf),
+        )
+    )
 
 
 def guards() -> dict[str, str]:

@@ -1,14 +1,13 @@
 """Two clocks brought together by what both have recorded."""
 
 import numpy as np
+import polars as pl
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from weighbridge import Signal
+from weighbridge import Signal, read_drive
 from weighbridge.constants import EARTH_RADIUS
-from weighbridge.io.clocks import settle_clocks
-from weighbridge.io.log import Log
 from weighbridge.signals.alignment import align
 
 
@@ -162,24 +161,19 @@ def test_turning_aligns_where_an_app_repeats_the_last_fix(tmp_path, held):
     rows = np.repeat(np.arange(fixes.size), held)
     stamps = 1.7e9 + np.arange(rows.size) / held
     path = np.cumsum(10.0 * np.cos(course)) / EARTH_RADIUS
-    app = Log(
-        path=tmp_path / "app.csv",
-        absolute=True,
-        signals=[
-            Signal("gnss_course", stamps, np.mod(course, 2.0 * np.pi)[rows]),
-            Signal("gnss_speed", stamps, np.full(rows.size, 10.0)),
-            Signal("latitude", stamps, path[rows]),
-        ],
-    )
     time = np.arange(turn.size) * 0.02 + 4.0
-    phone = Log(
-        path=tmp_path / "phone.csv",
-        signals=[
-            Signal(f"gyro_{axis}", time, part * turn + rng.normal(0.0, 0.02, turn.size))
-            for axis, part in zip("xyz", (0.6, 0.0, 0.8), strict=True)
-        ],
-    )
-    (problem,) = settle_clocks([app, phone])
-    assert problem.id == "clock.aligned"
-    late = phone.signals[0].time[0] - stamps[0]
+    gyro = {
+        f"gyro_{axis}_radps": part * turn + rng.normal(0.0, 0.02, turn.size)
+        for axis, part in zip("xyz", (0.6, 0.0, 0.8), strict=True)
+    }
+    app = {
+        "course_deg": np.rad2deg(np.mod(course, 2.0 * np.pi))[rows],
+        "speed_mps": np.full(rows.size, 10.0),
+        "latitude_deg": np.rad2deg(path[rows]),
+    }
+    pl.DataFrame({"time_s": stamps} | app).write_csv(tmp_path / "gnss.csv")
+    pl.DataFrame({"time_s": time} | gyro).write_csv(tmp_path / "imu.csv")
+    drive = read_drive(tmp_path)
+    assert any(p.id == "clock.aligned" for p in drive.problems)
+    late = drive.signals["gyro_x"].time[0] - drive.signals["gnss_speed"].time[0]
     assert abs(late) < 1.0

@@ -9,8 +9,6 @@ from tests.noted import refused
 
 from weighbridge import Drive, DriveInfo, Signal, Vehicle
 from weighbridge.balance import Reason, force_balance
-from weighbridge.balance.gear_fit import share_on_gears
-from weighbridge.balance.instants import WIND_AT_VEHICLE
 from weighbridge.balance.law import drag_force, rotating_mass
 from weighbridge.estimators.rls import estimate
 from weighbridge.navigation.motion import Motion
@@ -238,7 +236,8 @@ def test_delay_shifts_torque_against_motion():
 def test_headwind_from_the_north(heading, part):
     info = DriveInfo(wind_speed=8.0, wind_from=0.0)
     table = force_balance(drive(info=info), CAR, motion(heading=np.full(CLOCK.size, heading))).table
-    air = table.speed + part * WIND_AT_VEHICLE * 8.0
+    # Of the wind at 10 m, at 1 m over a roughness length of 0.1 m, by the logarithmic profile.
+    air = table.speed + part * 8.0 * np.log(1.0 / 0.1) / np.log(10.0 / 0.1)
     assert_allclose(drag_force(table, CAR), 0.5 * table.air_density * 0.6 * air**2, rtol=1e-9)
 
 
@@ -279,12 +278,3 @@ def test_an_outlier_is_a_bad_fit():
     # So sharp a fall behind it may be a foot that leaves the accelerator as well.
     assert track.row_reason[rising] in (Reason.BAD_FIT, Reason.OVERRUN)
     assert track.mass == pytest.approx(MASS, rel=0.01)
-
-
-def test_share_on_gears():
-    balance = force_balance(drive(), CAR, motion())
-    assert share_on_gears(balance, CAR) == 1.0
-    other = replace(CAR, driveline=Driveline(gearings=(17.0, 8.5)))
-    assert share_on_gears(force_balance(drive(), other, motion()), other) == 0.0
-    unknown = replace(CAR, driveline=Driveline())
-    assert share_on_gears(balance, unknown) is None

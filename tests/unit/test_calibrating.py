@@ -1,17 +1,21 @@
 """Calibration on simulated drives: what it finds, what it refuses."""
 
+import re
 import tomllib
 from dataclasses import replace
 from functools import cache
+from html import unescape
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from numba import config
 from tests.noted import error, refused, says
+from tests.unit.test_report import written
 
 from weighbridge import CalibrationSettings, ConfigError, Signal, Vehicle, calibrate, weigh
 from weighbridge.balance import force_balance
+from weighbridge.balance.law import force_on_mass, mass_column
 from weighbridge.calibration import self_weighing
 from weighbridge.calibration.printed import TrainingSettings
 from weighbridge.calibration.run import (
@@ -20,8 +24,6 @@ from weighbridge.calibration.run import (
     unfound_gears,
 )
 from weighbridge.cli.calibrate import speed_table, table
-from weighbridge.estimators.regression import regression
-from weighbridge.report.calibration_panels import calibration_facts
 from weighbridge.simulation import (
     Scenario,
     Sensors,
@@ -567,7 +569,10 @@ def test_report_terminal_and_file_tell_the_same(fitted, tmp_path, method):
     done = fitted(method)
     done.vehicle.save(tmp_path / "car.toml")
     saved = tomllib.loads((tmp_path / "car.toml").read_text(encoding="utf-8"))
-    report = dict(calibration_facts(done))
+    page = written(tmp_path, [], calibration=done)
+    report = {
+        unescape(k): unescape(v) for k, v in re.findall(r"<dt>(.*?)</dt><dd>(.*?)</dd>", page)
+    }
     shown = {name: (value, std) for name, value, std in cells(table(done))}
     told = {**{k: v for k, v in saved["torque"].items() if k == "coefficients"}}
     for name, (section, key, std_key) in FILE_KEYS.items():
@@ -603,7 +608,8 @@ def test_the_rows_shown_are_those_of_the_vehicle_saved(empty, fitted, tmp_path, 
     np.testing.assert_allclose(
         done.rows.source_torque, balance.table.torque[index], rtol=5e-4, atol=0.02
     )
-    phi, rest = regression(table, Vehicle.load(tmp_path / "car.toml"))
+    saved = Vehicle.load(tmp_path / "car.toml")
+    phi, rest = mass_column(table, saved), force_on_mass(table, saved)
     mass = empty.drive.info.mass - table.fuel_burnt
     taken = (mass * phi + table.traction_force - rest) / table.gearing
     np.testing.assert_allclose(done.rows.motion_torque, taken[index], rtol=5e-4, atol=0.05)

@@ -33,20 +33,16 @@ from weighbridge.papers.claims import (
     document,
     same,
 )
-from weighbridge.papers.du2025_equations import equations as du2025_equations
-from weighbridge.papers.galvao_equations import equations as galvao_equations
 from weighbridge.papers.jensen2022_drives import without_weather
-from weighbridge.papers.jensen2022_equations import equations as jensen2022_equations
-from weighbridge.papers.nguyen2024_equations import equations as nguyen2024_equations
 from weighbridge.simulation import make_scenario, simulate_car
 
 PAGE = Path(__file__).parents[2] / "docs" / "papers.md"
 
 EQUATIONS = {
-    "du2025": du2025_equations,
-    "galvao": galvao_equations,
-    "jensen2022": jensen2022_equations,
-    "nguyen2024": nguyen2024_equations,
+    "du2025": du2025.equations,
+    "galvao": galvao_figures.equations,
+    "jensen2022": jensen2022_found.equations,
+    "nguyen2024": nguyen2024.equations,
 }
 
 NUMBERED = {

@@ -9,7 +9,6 @@ from tests.noted import error
 
 from weighbridge import ConfigError, DriveError, WeighbridgeError, read_drive
 from weighbridge.io.draft import draft
-from weighbridge.io.file_patterns import file_patterns
 from weighbridge.io.mapping import load_mapping
 from weighbridge.io.mapping_text import mapping_text
 
@@ -196,20 +195,6 @@ def test_a_name_with_a_line_end_stays_in_its_comment(tmp_path):
     (tmp_path / "map.toml").write_text(text)
     drive = read_drive(tmp_path / "log.parquet", tmp_path / "map.toml")
     np.testing.assert_allclose(drive.signals["vehicle_speed"].values, SPEED / 3.6)
-
-
-@pytest.mark.parametrize(
-    ("names", "patterns"),
-    [
-        (["known_gps.csv", "known_obd.csv"], ["*gps.csv", "*obd.csv"]),
-        (["gps_2025-03-04.csv", "obd_2025-03-04.csv"], ["gps*.csv", "obd*.csv"]),
-        (["a.csv", "b.csv"], ["a.csv", "b.csv"]),
-        (["trip1.csv", "trip1_imu.csv"], ["trip1.csv", "trip1_imu.csv"]),
-        (["x [1] a.csv", "x [1] b.csv"], ["*a.csv", "*b.csv"]),
-    ],
-)
-def test_patterns_fit_the_files_of_other_drives(names, patterns):
-    assert file_patterns([[name] for name in names]) == patterns
 
 
 def test_decimal_commas_in_a_sparse_table(tmp_path):

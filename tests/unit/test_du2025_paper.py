@@ -7,8 +7,6 @@ import pytest
 
 from weighbridge.estimators.settings import changed, parsed
 from weighbridge.papers import Reproduced, du2025
-from weighbridge.papers.du2025_claims import CLAIMS
-from weighbridge.papers.du2025_methods import BAND, FORMS, METHODS, PAPER_RMSE, READINGS
 from weighbridge.papers.du2025_running import running_error, swing
 
 SEED = 3
@@ -23,9 +21,9 @@ def judged() -> du2025.DriveResult:
 
 def test_all_methods_are_better_than_the_papers_at_half_load(judged):
     assert judged.true_mass == pytest.approx(10_000.0, abs=1.0)
-    for method, theirs in zip(METHODS, PAPER_RMSE["half-load"], strict=True):
+    for method, theirs in zip(du2025.METHODS, du2025.PAPER_RMSE["half-load"], strict=True):
         assert judged.late_rmse[method] < theirs
-        assert judged.worst[method] < BAND
+        assert judged.worst[method] < du2025.BAND
         track = judged.tracks[method]
         late = track.time >= 24.0
         error = track.running_mass[late] - judged.true_mass
@@ -40,7 +38,7 @@ def test_the_data_sheet_is_that_of_table_1():
 
 
 def test_the_printed_rolling_coefficient_alone_makes_all_methods_heavy(judged):
-    for method in METHODS:
+    for method in du2025.METHODS:
         assert judged.printed["l1"][method] > 1000.0
         assert judged.printed_mean["l1"][method] > 700.0
         assert judged.printed["lt"][method] < 0.5 * judged.printed["l10"][method]
@@ -140,7 +138,7 @@ def claimed(judged, **other):
     """Say what the claims become of drives whose printed runs told something else."""
     drives = tuple(replace(judged, load=load, **other) for load in du2025.LOADS)
     made = du2025.Reproduction(drives=drives, road=(), sheet=(), vehicle=du2025.known_bus())
-    return {c.code: c.judge(made, "l1") for c in CLAIMS}
+    return {c.code: c.judge(made, "l1") for c in du2025.CLAIMS}
 
 
 def test_each_sentence_of_the_text_is_judged_by_the_printed_runs(judged):
@@ -148,7 +146,9 @@ def test_each_sentence_of_the_text_is_judged_by_the_printed_runs(judged):
 
     def runs(**by_method):
         usual = judged.printed_running[form]
-        return {form: {m: replace(usual[m], **by_method[m.replace("-", "_")]) for m in METHODS}}
+        return {
+            form: {m: replace(usual[m], **by_method[m.replace("-", "_")]) for m in du2025.METHODS}
+        }
 
     least = {
         "first": 0.9, "steady_at": 20.0, "swing": 0.05, "slow": 50.0, "fast": 200.0,
@@ -158,8 +158,8 @@ def test_each_sentence_of_the_text_is_judged_by_the_printed_runs(judged):
         "first": 0.2, "steady_at": 9.0, "swing": 0.001, "slow": 80.0, "fast": 100.0,
         "early": 50.0, "late": 40.0, "wander": 10.0,
     }  # fmt: skip
-    masses = dict(zip(METHODS, (300.0, 200.0, 100.0), strict=True))
-    worst = dict.fromkeys(METHODS, 0.05)
+    masses = dict(zip(du2025.METHODS, (300.0, 200.0, 100.0), strict=True))
+    worst = dict.fromkeys(du2025.METHODS, 0.05)
     like = {"printed": {form: masses}, "printed_worst": {form: worst}}
     as_told = claimed(
         judged,
@@ -170,8 +170,8 @@ def test_each_sentence_of_the_text_is_judged_by_the_printed_runs(judged):
     assert as_told["blend half-load"][0] == "100 of 300 and 200 kg: better than both"
     assert as_told["sooner"][0] == "9 s; least squares 20 s"
     # The other way round no sentence holds but those of one method or of the loads alone.
-    masses = dict(zip(METHODS, (200.0, 300.0, 250.0), strict=True))
-    worst = {form: dict.fromkeys(METHODS, 0.2)}
+    masses = dict(zip(du2025.METHODS, (200.0, 300.0, 250.0), strict=True))
+    worst = {form: dict.fromkeys(du2025.METHODS, 0.2)}
     turned = claimed(
         judged, printed={form: masses}, printed_worst=worst,
         printed_running=runs(robust_rls=kalman | {"late": 40.0}, ekf=least, hybrid=kalman),
@@ -188,7 +188,7 @@ def test_each_sentence_of_the_text_is_judged_by_the_printed_runs(judged):
 
 def test_tables_and_page_name_what_differs(judged, tmp_path, monkeypatch):
     drives = tuple(replace(judged, load=load) for load in du2025.LOADS)
-    poor = replace(judged, load="no-load", late_rmse=dict.fromkeys(METHODS, 5000.0))
+    poor = replace(judged, load="no-load", late_rmse=dict.fromkeys(du2025.METHODS, 5000.0))
     known = du2025.known_bus()
     vehicle = replace(known, torque=known.torque.scaled(1.0))
     vehicle = replace(vehicle, torque=replace(vehicle.torque, coefficients=(-80.0, 0.95)))
@@ -208,7 +208,7 @@ def test_tables_and_page_name_what_differs(judged, tmp_path, monkeypatch):
     heavy = rows["table 2", "RMSE, robust-rls half-load"]
     assert heavy.verdict == "differs"
     # A difference is accounted for by a reading of print in which this run agrees, or not at all.
-    readings = {form.check: form.code for form in READINGS}
+    readings = {form.check: form.code for form in du2025.READINGS}
     for row in done.rows:
         if row.item == "table 2" and row.conditions == "as printed" and row.verdict == "differs":
             assert row.accounted is bool(row.check)
@@ -226,5 +226,5 @@ def test_tables_and_page_name_what_differs(judged, tmp_path, monkeypatch):
     assert text.index("f = 0.0005") < text.index("Table 2 by the settings as printed")
     for title in ("Fig. 4: h(v)", "Fig. 5a", "Fig. 5d", "Fig. 6", "Fig. 7", "With all effects"):
         assert title in text
-    for form in FORMS:
+    for form in du2025.FORMS:
         assert f"mass, half-load, {form.name}" in text

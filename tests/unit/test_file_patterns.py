@@ -1,5 +1,6 @@
 """Patterns of file names: dates and numbers may be others, and kinds of file stay apart."""
 
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -8,31 +9,9 @@ import pytest
 
 from weighbridge import DriveError, read_drive
 from weighbridge.io.draft import draft
-from weighbridge.io.file_patterns import file_patterns
 from weighbridge.io.mapping_text import mapping_text
 
 T = np.arange(0.0, 30.0, 0.1)
-
-
-@pytest.mark.parametrize(
-    ("names", "others", "patterns"),
-    [
-        (
-            [["phone_20210305_180000.csv"], ["2021-03-05 18-00-00.csv"]],
-            [],
-            ["phone_*.csv", "[0-9]*.csv"],
-        ),
-        ([["phone_20210305.csv"]], [], ["phone_*.csv"]),
-        ([["phone_20210305.csv"]], ["phone_notes.csv"], ["phone_20210305.csv"]),
-        ([["log0012.csv"], ["obd2.csv"]], [], ["log*.csv", "obd2.csv"]),
-        ([["obd_0012.csv", "obd_0013.csv"], ["gps.csv"]], [], ["obd_*.csv", "gps.csv"]),
-        ([["obd monday.csv", "obd friday.csv"], ["gps.csv"]], [], ["obd *day.csv", "gps.csv"]),
-        ([["monday.csv", "x.csv"], ["gps.csv"]], [], []),
-        ([["a [1] 2021-03.csv"], ["b.csv"]], [], ["a [[]1] *.csv", "b.csv"]),
-    ],
-)
-def test_dates_and_numbers_may_be_others(names, others, patterns):
-    assert file_patterns(names, others) == patterns
 
 
 def recorded(folder: Path, stamp: str) -> list[Path]:
@@ -56,6 +35,34 @@ def mapped(weighbridge, tmp_path):
         return output.read_text(encoding="utf-8")
 
     return made
+
+
+@pytest.mark.parametrize(
+    ("names", "patterns"),
+    [
+        ([["phone_20210305_180000.csv"], ["2021-03-05 18-00.csv"]], ["phone_*.csv", "[0-9]*.csv"]),
+        ([["log0012.csv"], ["obd2.csv"]], ["log*.csv", "obd2.csv"]),
+        ([["obd_0012.csv", "obd_0013.csv"], ["gps.csv"]], ["obd_*.csv", "gps.csv"]),
+        ([["obd monday.csv", "obd friday.csv"], ["gps.csv"]], ["obd *day.csv", "gps.csv"]),
+        ([["monday.csv", "x.csv"], ["gps.csv"]], ["monday.csv", "x.csv", "gps.csv"]),
+        ([["a [1] 2021-03.csv"], ["b.csv"]], ["a [[]1] *.csv", "b.csv"]),
+        ([["known_gps.csv"], ["known_obd.csv"]], ["*gps.csv", "*obd.csv"]),
+        ([["gps_2025-03-04.csv"], ["obd_2025-03-04.csv"]], ["gps*.csv", "obd*.csv"]),
+        ([["a.csv"], ["b.csv"]], ["a.csv", "b.csv"]),
+        ([["trip1.csv"], ["trip1_imu.csv"]], ["trip1.csv", "trip1_imu.csv"]),
+        ([["x [1] a.csv"], ["x [1] b.csv"]], ["*a.csv", "*b.csv"]),
+    ],
+)
+def test_dates_and_numbers_may_be_others(mapped, tmp_path, names, patterns):
+    """Files of a kind have the same columns."""
+    kinds = ({"accX (m/s^2)": np.sin(T)}, {"Vehicle speed (km/h)": 50.0 + np.sin(T)})
+    paths = []
+    for columns, files in zip(kinds, names, strict=True):
+        for name in files:
+            paths.append(tmp_path / name)
+            pl.DataFrame({"Time (s)": T} | columns).write_csv(paths[-1])
+    tables = tomllib.loads(mapped(*paths))["tables"]
+    assert [table["files"] for table in tables.values()] == patterns
 
 
 def test_a_mapping_of_one_drive_reads_another_of_other_dates(mapped, tmp_path):

@@ -242,9 +242,12 @@ def test_a_drive_that_shows_no_floor_has_that_of_the_vehicle_file():
     assert np.mean(found[~dragged[::4]] == Reason.OVERRUN) < 0.15
 
 
-def test_a_reading_that_has_risen_far_is_found_by_the_motion():
+@pytest.mark.parametrize("noise", [0.0, 0.01])
+def test_a_reading_that_has_risen_far_is_found_by_the_motion(noise):
+    """Without noise its lowest value shows it, too."""
     car = replace(LOADED, dragged=DRAGS)
-    risen = recorded(engine_load=load_of(STAMPS) + 0.12)
+    noise = noise * np.random.default_rng(8).standard_normal(STAMPS.size)
+    risen = recorded(engine_load=load_of(STAMPS) + 0.12 + noise)
     off = foot(STAMPS) < 0.5
     need = np.where(foot(CLOCK) < 0.5, -0.5, 0.5)
     moved = replace(motion(), specific_force=need, accel=need)

@@ -8,8 +8,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import weighbridge as wb
 from weighbridge import Drive, Signal, Vehicle
+from weighbridge.balance.law import mass_column
 from weighbridge.estimators import ESTIMATORS
-from weighbridge.estimators.regression import regression
 from weighbridge.simulation import MIDSIZE, Polling, Scenario, Sensors, short_route, simulate_car
 from weighbridge.vehicle.fuel import DENSITY, SEEN, Burnt, fuel_burnt, fuel_flow
 from weighbridge.vehicle.model import Driveline
@@ -114,7 +114,7 @@ def test_the_mass_is_that_at_the_end_of_the_drive(weighed):
     balance = weighing.result.balance
     table = balance.table
     tank = 200.0 * (table.time - table.time[0]) / (table.time[-1] - table.time[0])
-    phi, _ = regression(table, car)
+    phi = mass_column(table, car)
     lighter = replace(table, traction_force=table.traction_force - tank * phi)
     told = joint.estimate(
         replace(balance, table=replace(lighter, fuel_burnt=table.fuel_burnt + tank)), car

@@ -10,7 +10,6 @@ from tests.noted import error, noted
 import weighbridge as wb
 from weighbridge import ConfigError, Drive, DriveError, Signal, to_frames
 from weighbridge.io import write_drive
-from weighbridge.pipeline.given import as_drives
 
 
 @pytest.fixture(scope="module")
@@ -49,9 +48,10 @@ def test_data_frames_go_out_and_come_back(brief_drive, short_car, library):
 
 
 def test_drives_of_frames_are_numbered(brief_drive):
-    frames = to_frames(brief_drive)
-    assert [d.name for d in as_drives([frames, frames])] == ["frame 1", "frame 2"]
-    assert as_drives(frames)[0].name == "frame"
+    frames, quick = to_frames(brief_drive), wb.CalibrationSettings(method="rls")
+    for given, names in ((frames, ("frame",)), ([frames, frames], ("frame 1", "frame 2"))):
+        made = wb.calibrate(given, mass=1700.0, settings=quick)
+        assert made.provenance.drives == names
 
 
 def test_an_index_is_a_column_and_dates_are_the_time():

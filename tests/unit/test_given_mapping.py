@@ -1,15 +1,13 @@
 """Paths are read as the vehicle file says."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import pandas as pd
 import pytest
 from tests.noted import error
 
 import weighbridge as wb
-from weighbridge import Vehicle, to_frames
-from weighbridge.pipeline.given import mapping_beside, mapping_of
+from weighbridge import to_frames
 
 
 def test_a_path_is_read_with_the_mapping_that_the_vehicle_file_names(
@@ -36,16 +34,6 @@ def test_a_path_is_read_with_the_mapping_that_the_vehicle_file_names(
     weighed = wb.weigh(folder, tmp_path / "car.toml")
     assert weighed.mass == by_hand.mass
     assert wb.inspect_drive(folder, tmp_path / "car.toml").drive.has("vehicle_speed")
-
-
-def test_a_mapping_is_named_as_the_vehicle_file_sees_it(tmp_path, monkeypatch):
-    (tmp_path / "files").mkdir()
-    monkeypatch.chdir(tmp_path)
-    assert mapping_beside(Path("map.toml"), Path("car.toml")) == "map.toml"
-    named = mapping_beside(Path("map.toml"), Path("files/car.toml"))
-    assert named == "../map.toml"
-    car = Vehicle(mapping=named)
-    assert mapping_of(car, Path("files/car.toml")).resolve() == (tmp_path / "map.toml").resolve()
 
 
 OWN = {

@@ -22,7 +22,6 @@ from weighbridge import (
 )
 from weighbridge.inertia.filter import RideSamples, inverse_interval, run_filter
 from weighbridge.inertia.integration import integration_std
-from weighbridge.inertia.load_changes import jumps
 from weighbridge.inertia.ride_checks import ride_samples
 from weighbridge.inertia.suspension import check_suspension
 from weighbridge.papers.nguyen2024 import suspension_of
@@ -159,7 +158,8 @@ def test_a_turn_that_sets_in_hard_is_no_load():
     ride = simulated(manoeuvres=((3.0, 5.5, -9.0, 0.0), (7.0, 11.0, 2.0, 5.0)), seed=23,
                      vehicle=LIGHT, duration=16.0)  # fmt: skip
     told = estimate_inertia(ride.drive, LIGHT_CAR)
-    assert jumps(told.track)  # what was taken for a jump, and moved no mass
+    # What was taken for a jump moved no mass.
+    assert np.isfinite(told.track.jumped).any()
     assert told.status == "converged"
     assert len(told.segments) == 1
     assert told.suspension is not None

@@ -1,16 +1,16 @@
 """Interpolation and means of windows against NumPy."""
 
-from itertools import pairwise
+from itertools import groupby, pairwise
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import cumulative_trapezoid
 
-from weighbridge import Signal
 from weighbridge.kernels.interpolation import (
     distance_to_nearest,
     integral,
+    interpolate,
     longest_repeat,
     mixed,
     moved_changes,
@@ -20,8 +20,6 @@ from weighbridge.kernels.interpolation import (
     trapezoid_means,
 )
 from weighbridge.kernels.shaking import widest_spread
-from weighbridge.signals.interpolation import interpolate
-from weighbridge.signals.runs import runs_of
 
 
 @np.errstate(invalid="ignore")  # NumPy says nothing of infinite values, its scalars do.
@@ -33,22 +31,13 @@ def test_interpolation_is_that_of_numpy_to_the_last_bit(seed):
     values = rng.normal(size=time.size)
     values[100:103], values[200] = np.inf, np.nan
     rising = np.sort(rng.uniform(-3.0, 53.0, 500))
-    for at in (
-        rising,
-        rising[::-1],
-        rng.permutation(np.concatenate([rising, time, [np.nan, np.inf, -np.inf]])),
-        (rising - np.array([[0.0], [1.0]]))[:, ::2],
-        np.array(7.5),
-        np.empty(0),
-    ):
-        expected = np.interp(at, time, values)
-        assert_array_equal(interpolate(at, time, values), expected)
-        assert interpolate(at, time, values).shape == np.shape(expected)
-        assert_array_equal(
-            interpolate(at, time, values, left=np.nan, right=1.0),
-            np.interp(at, time, values, left=np.nan, right=1.0),
-        )
-    assert_array_equal(interpolate(rising, time[:1], values[:1]), np.full(500, values[0]))
+    mixed_up = rng.permutation(np.concatenate([rising, time, [np.nan, np.inf, -np.inf]]))
+    for at in (rising, rising[::-1].copy(), mixed_up, np.empty(0)):
+        for ends in ((values[0], values[-1]), (np.nan, 1.0)):
+            expected = np.interp(at, time, values, *ends)
+            assert_array_equal(interpolate(at, time, values, *ends), expected)
+    ends = (values[0], values[0])
+    assert_array_equal(interpolate(rising, time[:1], values[:1], *ends), np.full(500, values[0]))
 
 
 def test_the_nearest_point_is_that_of_all():
@@ -124,8 +113,9 @@ def test_the_longest_repeat_is_that_of_the_runs_of_a_signal():
     rng = np.random.default_rng(9)
     time = np.cumsum(rng.uniform(0.01, 0.02, 2000))
     for levels in (1, 2, 5, 10**9):
-        signal = Signal("accel_x", time, rng.integers(levels, size=2000).astype(float))
-        assert longest_repeat(time, signal.values) == runs_of(signal).duration.max()
+        values = rng.integers(levels, size=2000).astype(float)
+        runs = [list(rows) for _, rows in groupby(range(2000), key=lambda k, v=values: v[k])]
+        assert longest_repeat(time, values) == max(time[rows[-1]] - time[rows[0]] for rows in runs)
     assert longest_repeat(np.empty(0), np.empty(0)) == 0.0
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import polars as pl
 from numpy.testing import assert_array_equal
 
-from weighbridge.io import parquet
+from weighbridge import read_drive
 from weighbridge.navigation import aiding
 from weighbridge.navigation.aiding import resample
 from weighbridge.navigation.inertial import inertial_motion
@@ -46,20 +46,20 @@ def test_memory_grows_with_the_samples_and_slowly():
     assert long < 1.05 * bytes_per_sample(1000.0)
 
 
-def test_a_table_read_in_stretches_is_the_table(tmp_path, monkeypatch):
-    values = np.random.default_rng(2).normal(size=1000)
-    values[[5, 500]] = np.nan
-    cells = pl.Series("b", values).to_frame().with_row_index("n")
-    cells = cells.with_columns(a=pl.when(pl.col("n") % 7 == 0).then(None).otherwise(pl.col("b")))
-    cells.write_parquet(tmp_path / "log.parquet", row_group_size=300)
-    monkeypatch.setattr(parquet, "_ROWS", 64)
-    read = parquet.read_parquet(tmp_path / "log.parquet")
-    assert read.names == ("n", "b", "a")
-    assert read.rows == 1000
-    found, notes = read.numbers(1)
-    assert_array_equal(found, values)
-    assert [note.id for note in notes] == ["file.cells_nan"]
-    gaps, notes = read.numbers(2)
-    assert_array_equal(np.isnan(gaps), np.isnan(values) | (np.arange(1000) % 7 == 0))
-    assert [note.id for note in notes] == ["file.cells_nan"]
-    assert_array_equal(read.numbers(0)[0], np.arange(1000.0))
+def test_a_table_read_in_stretches_is_the_table(tmp_path):
+    """More than a million rows, of which some cells are empty, and some no numbers."""
+    count = (1 << 20) + 1000
+    values = np.random.default_rng(2).uniform(10.0, 20.0, count)
+    values[[5, count - 500]] = np.nan
+    empty = np.arange(count) % 7 == 0
+    table = pl.DataFrame({"time_s": 0.01 * np.arange(count), "vehicle_speed_mps": values})
+    gaps = pl.when(pl.lit(pl.Series(empty))).then(None).otherwise(pl.col("vehicle_speed_mps"))
+    table.with_columns(gnss_speed_mps=gaps).write_parquet(tmp_path / "log.parquet")
+    drive = read_drive(tmp_path / "log.parquet")
+    for name, known in (
+        ("vehicle_speed", np.isfinite(values)),
+        ("gnss_speed", np.isfinite(values) & ~empty),
+    ):
+        assert_array_equal(drive.signals[name].time, 0.01 * np.flatnonzero(known))
+        assert_array_equal(drive.signals[name].values, values[known])
+    assert "file.cells_nan" in {note.id for note in drive.problems}

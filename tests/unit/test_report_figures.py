@@ -159,6 +159,25 @@ def test_a_map_has_a_bar_of_a_round_length(tmp_path, metres):
     assert min(abs(leading - n) for n in (1.0, 2.0, 5.0)) < 2e-3
     value, unit = figure["layout"]["annotations"][-1]["text"].split()
     assert float(value) * {"m": 1.0, "km": 1e3}[unit] == pytest.approx(length, rel=1e-4)
+    north = [numbers(t["y"]).min() for t in figure["data"] if t is not bar]
+    assert max(numbers(bar["y"])) < min(north)
+
+
+@pytest.mark.parametrize("hours", [0.1, 2.0])
+def test_a_gap_in_the_mass_is_no_line_and_a_peak_is_drawn(hours):
+    """Of a short drive each sample is drawn, of a long one every thirtieth."""
+    w = make_weighing(hours=hours)
+    minutes = (w.result.time - w.drive.start) / 60.0
+    begin, end = minutes[-1] * np.array([0.4, 0.5])
+    mass = np.where((minutes > begin) & (minutes < end), np.nan, w.result.running_mass)
+    mass[-50] = 3000.0
+    drawn = mass_figure(replace(w, result=replace(w.result, running_mass=mass)))
+    line = next(t for t in drawn.data if t.name == "running mass")
+    x, y = np.asarray(line.x), np.asarray(line.y)
+    (gap,) = np.flatnonzero(np.isnan(y))
+    assert x[gap - 1] < begin + 1e-3
+    assert x[gap + 1] > end - 1e-3
+    assert np.nanmax(y) == pytest.approx(3000.0, rel=1e-4)
 
 
 def variables(html):

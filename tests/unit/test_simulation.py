@@ -35,7 +35,6 @@ from weighbridge.simulation import (
     simulate_car,
     usual_polling,
 )
-from weighbridge.simulation.route import _turn
 
 
 def short(seed=5, duration=80.0, **changes):
@@ -727,9 +726,3 @@ def test_any_seed_makes_a_route(seed):
     route = jensen_route(seed)
     assert np.isfinite(route.heading).all()
     assert route.heading.size == jensen_route(1).heading.size
-
-
-def test_a_turn_beyond_the_end_of_a_leg_is_left_out():
-    curvature = np.zeros(50)
-    _turn(curvature, 500, 0.3, 120.0)
-    assert not curvature.any()

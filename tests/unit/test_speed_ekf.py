@@ -56,7 +56,31 @@ def test_answer_is_the_start_and_is_told_as_such(car):
     assert math.isnan(weighed.mass)
     assert weighed.result.mass == pytest.approx(1092.0, rel=0.01)
     assert weighed.reason_id == "speed.no_mass"
+    assert weighed.refusal.values["share"] == pytest.approx(100.0, abs=1.0)
     assert weighed.result.std > 0.2 * 0.99 * weighed.result.mass
+
+
+def test_the_mass_is_the_mean_of_the_calmest_groups_of_the_last_samples(car):
+    """Galvão et al., sec. 4: of ten groups of the last three quarters, those that move least."""
+    printed = {"process_var": (0.1, 1e-10, 0.005)}
+    found = wb.weigh(drive(2), car, method="speed-ekf", settings=printed).result
+    running = found.running_mass[found.used]
+    groups = np.array_split(running[running.size // 4 :], 10)
+    spreads = [group.std() for group in groups]
+    calm = [g for g, spread in zip(groups, spreads, strict=True) if spread <= np.mean(spreads)]
+    assert 3 < len(calm) < 8
+    assert found.mass == pytest.approx(np.concatenate(calm).mean(), rel=1e-12)
+
+
+def test_windows_are_as_many_as_fit_and_need_most_of_their_samples(car):
+    whole = drive(2, seconds=1190.1, rate=10.0, graded=False)
+    speed = whole.signals["vehicle_speed"]
+    keep = (speed.time < 350.0) | (speed.time > 380.0)
+    gap = whole.with_signals(Signal("vehicle_speed", speed.time[keep], speed.values[keep]))
+    for made, missing in ((whole, []), (gap, [50, 51, 52, 53])):
+        table = wb.weigh(made, car, method="speed-ekf").result.balance.table
+        assert table.time[-1] == 1190.0
+        assert np.flatnonzero(np.isnan(table.speed)).tolist() == missing
 
 
 def test_other_signals_are_not_looked_at(car):
@@ -77,14 +101,14 @@ def test_gnss_speed_does_as_well(car):
     assert found.result.mass == wb.weigh(made, car, method="speed-ekf").result.mass
 
 
-def test_a_start_that_is_forgotten_gives_a_mass_with_its_interval(car, monkeypatch):
-    # Not what recorded cars do: the paths beyond the refusal are tried on their own.
-    monkeypatch.setattr("weighbridge.estimators.speed_ekf.start_share", lambda *_: 0.1)
-    doubtful = wb.weigh(drive(2), car, method="speed-ekf")
+def test_a_start_that_is_forgotten_gives_a_mass_with_its_interval(car):
+    # Not what recorded cars do: the paths beyond the refusal are tried by settings.
+    forgets = {"initial_var": (1e-4, 1e-6, 1e-6), "process_var": (1e-3, 1e-14, 1e-8)}
+    doubtful = wb.weigh(drive(2), car, method="speed-ekf", settings=forgets)
     assert doubtful.status == "not_excited"
     assert doubtful.reason_id == "speed.wide"
     sure = replace(car, speed_model=replace(car.speed_model, scale_std=0.1))
-    weighed = wb.weigh(drive(2), sure, method="speed-ekf")
+    weighed = wb.weigh(drive(2), sure, method="speed-ekf", settings=forgets)
     low, high = weighed.interval(0.95)
     assert weighed.status == "converged"
     assert high - low > 0.35 * weighed.mass

@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 from tests.noted import error
 
 from weighbridge import ConfigError, Vehicle
-from weighbridge.estimators.considered import pinned
 from weighbridge.vehicle.file import save_vehicle
 from weighbridge.vehicle.model import (
     WITNESS_TERMS,
@@ -26,7 +25,6 @@ from weighbridge.vehicle.model import (
     Timing,
     TorqueModel,
 )
-from weighbridge.vehicle.rounding import covariance_texts
 
 positive = st.floats(1e-6, 1e6)
 finite = st.floats(-1e9, 1e9)
@@ -232,17 +230,19 @@ def test_numbers_are_rounded_to_their_uncertainty(tmp_path):
     assert (tmp_path / "again.toml").read_text(encoding="utf-8") == text
 
 
-def test_a_covariance_with_a_known_combination_is_rounded_and_keeps_it():
+def test_a_covariance_with_a_known_combination_is_rounded_and_keeps_it(tmp_path):
     """The scale of every mass is taken out of it, which leaves it singular."""
     rng = np.random.default_rng(5)
     parts = rng.normal(size=(6, 6)) * np.array([1.0, 1e-2, 1e-3, 0.3, 1e-3, 2.0])
     known = rng.normal(size=6)
-    cov = pinned(parts.T @ parts, known)
-    rows = np.tril_indices(6)
-    texts = covariance_texts(tuple(cov[rows]), exact=False)
+    whole = parts.T @ parts
+    cov = whole - np.outer(whole @ known, whole @ known) / (known @ whole @ known)
+    rows, path = np.tril_indices(6), tmp_path / "car.toml"
+    Vehicle(provenance=Provenance(fit_cov=tuple(cov[rows]))).save(path)
+    texts = re.findall(r"[-+.\de]+", path.read_text(encoding="utf-8").partition("fit_cov = ")[2])
     assert max(len(t.strip("-0.").replace(".", "")) for t in texts) <= 9
     again = np.zeros((6, 6))
-    again[rows] = [float(t) for t in texts]
+    again[rows] = Vehicle.load(path).provenance.fit_cov
     again += np.tril(again, -1).T
     apart = np.sum((known * np.sqrt(np.diag(cov))) ** 2)
     assert abs(known @ again @ known) < 1e-7 * apart

@@ -12,7 +12,6 @@ from tests.noted import error
 
 from weighbridge import ConfigError, DriveError, read_drive, whole
 from weighbridge.io import write_table
-from weighbridge.io.write import DRIVE_FILES
 from weighbridge.whole import PART, REPLACING, whole_file, whole_folder, write_whole
 
 TABLE = "time_s,vehicle_speed_kmh\n0,{}\n1,20\n2,30\n"
@@ -182,7 +181,10 @@ def drive(folder: Path, speed: int, suffix: str = "csv") -> Path:
 
 
 def written(folder: Path, speed: int, stop: BaseException | None = None) -> None:
-    with whole_folder(folder, DRIVE_FILES) as part:
+    files = {
+        f"{table}.{suffix}" for table in ("obd", "imu", "gnss") for suffix in ("csv", "parquet")
+    }
+    with whole_folder(folder, files | {"drive.toml"}) as part:
         (part / "obd.csv").write_text(TABLE.format(speed))
         (part / "drive.toml").write_text("notes = 'new'\n")
         if stop is not None:
@@ -240,7 +242,6 @@ def test_an_error_between_the_moves_takes_them_back(tmp_path, monkeypatch, move)
 SWAP_KILLED = """
 import os, signal, sys
 from pathlib import Path
-from weighbridge.io.write import DRIVE_FILES
 from weighbridge.whole import whole_folder
 real, left = Path.replace, [int(sys.argv[2])]
 def replace(self, target):
@@ -249,7 +250,7 @@ def replace(self, target):
     left[0] -= 1
     return real(self, target)
 Path.replace = replace
-with whole_folder(sys.argv[1], DRIVE_FILES) as part:
+with whole_folder(sys.argv[1], {"obd.csv", "imu.csv"}) as part:
     for name in ("obd.csv", "imu.csv"):
         (part / name).write_text("new")
 """
