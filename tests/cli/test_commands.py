@@ -383,7 +383,7 @@ def test_demo(weighbridge, tmp_path, monkeypatch):
     errors = [float(line.split("│")[-2]) for line in ran.out.splitlines() if " kg │" in line]
     assert len(errors) == 3
     assert max(abs(e) for e in errors) < 5.0
-    page = (tmp_path / "demo.html").read_text(encoding="utf-8")
+    page = (tmp_path / "demo.html").read_text(encoding="utf-8").replace("\u00a0", " ")
     assert len(page) > 100_000
     assert page.count("of 2060 kg, within it:") == 3
     assert page.count("fuel burnt on the way taken off") == 3
