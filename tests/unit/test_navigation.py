@@ -14,7 +14,7 @@ from tests.noted import refused
 from weighbridge import ConfigError, Drive, Signal, Vehicle
 from weighbridge.constants import GRAVITY
 from weighbridge.kernels.ins_model import P
-from weighbridge.kernels.lowpass import lowpass_resample
+from weighbridge.kernels.lowpass import lowpass_even, lowpass_resample
 from weighbridge.navigation.geodesy import LocalFrame
 from weighbridge.navigation.identify.timing import estimate_speed_delay
 from weighbridge.navigation.inertial import inertial_motion
@@ -356,6 +356,22 @@ def test_lowpass_response_on_an_even_clock():
         )  # fmt: skip
         gain = np.abs(np.mean((out[:, 0] + 1j * out[:, 1]) * np.exp(-2j * np.pi * hertz * grid)))
         assert low <= gain <= high, hertz
+
+
+def test_lowpass_on_an_even_clock_knows_neither_gaps_nor_what_lies_beyond_a_silence():
+    rng = np.random.default_rng(4)
+    values, reach, share = rng.normal(size=(60, 2)), 6, 0.05
+    good, anew = rng.uniform(size=60) > 0.2, np.zeros(60, dtype=bool)
+    anew[25] = True
+    out = lowpass_even(values, good, anew, share, reach)
+    window = np.hanning(2 * reach + 3)[1:-1] * np.sinc(2.0 * share * np.arange(-reach, reach + 1))
+    for first, last in ((0, 25), (25, 60)):
+        counts = good[first:last].astype(float)
+        for c in range(2):
+            sums = np.convolve(counts * values[first:last, c], window, "same")
+            kept = sums / np.convolve(counts, window, "same")
+            expected = np.where(good[first:last], kept, values[first:last, c])
+            assert_allclose(out[first:last, c], expected, atol=1e-12)
 
 
 def test_local_frame_both_ways():

@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from weighbridge.balance.force_balance import force_rows, usable_rows
-from weighbridge.balance.instants import lagged_motion
+from weighbridge.balance.instants import in_band, lagged_motion
 from weighbridge.balance.law import force_on_mass
 from weighbridge.balance.table import ForceBalance
 from weighbridge.navigation.motion import Motion
@@ -222,7 +222,7 @@ def _misfit(
     setup = begun.setup
     assert setup is not None
     views = {begun.delay: begun.table}
-    lagged = lagged_motion(motion, vehicle.timing.torque_lag)
+    lagged = in_band(lagged_motion(motion, vehicle.timing.torque_lag), vehicle)
     for delay in map(float, delays):
         views[delay] = usable_rows(drive, vehicle, motion, lagged, delay, setup)
     # Rows that come and go with the delay would make its misfit rough.

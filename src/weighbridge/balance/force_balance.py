@@ -18,6 +18,7 @@ from weighbridge.balance.foot_setup import learn_dragged
 from weighbridge.balance.instants import (
     SLOWEST_GEARED,
     Instants,
+    in_band,
     interpolate_motion,
     lagged_motion,
     read_instants,
@@ -114,7 +115,9 @@ def force_balance(
     lagged = lagged_motion(motion, lag, since.lagged if since is not None else None)
     if setup is not None:
         engine_delay = setup.engine_delay
-    read = _read(drive, vehicle, lagged, source, delay, engine_delay, setup, since)
+    read = _read(
+        drive, vehicle, in_band(lagged, vehicle), source, delay, engine_delay, setup, since
+    )
     fill = setup.fill if setup is not None else identify_fill(source)
     brakes, table = _judged(drive, vehicle, motion, source, read, lag, signed, fill, setup)
     if setup is None:
@@ -163,7 +166,7 @@ def force_rows(
     Parameters
     ----------
     drive, vehicle, delay, setup : as of `force_balance`
-    lagged : the motion, smoothed as the torque is
+    lagged : the motion, smoothed as the torque is, and `in_band`
     """
     source = source_signal(drive, vehicle)
     return _read(drive, vehicle, lagged, source, delay, setup.engine_delay, setup).table
@@ -346,7 +349,8 @@ def dragged_reading(
     for drive, motion in zip(drives, motions, strict=True):
         source = source_signal(drive, vehicle)
         time = source.time - (vehicle.timing.torque_delay or 0.0)
-        rows = interpolate_motion(lagged_motion(motion, vehicle.timing.torque_lag), time)
+        lagged = in_band(lagged_motion(motion, vehicle.timing.torque_lag), vehicle)
+        rows = interpolate_motion(lagged, time)
         pressure = dynamic_pressure(air_density(drive, rows["altitude"]), rows["speed"])
         needed, weight = needed_force(vehicle, rows["specific_force"], pressure)
         sources.append(source)

@@ -12,6 +12,7 @@ from weighbridge.balance import ForceBalance, force_balance
 from weighbridge.balance.instants import (
     SLOWEST_GEARED,
     identify_engine_delay,
+    in_band,
     lagged_motion,
     read_instants,
 )
@@ -57,6 +58,7 @@ class Recording:
     Attributes
     ----------
     drive, motion
+    slow : the motion `in_band`
     mass : known, as the drive begins [kg]
     draft : vehicle with gears and source, without a torque model
     reading : (n,) of the torque source at its stamps, in the air of the calibration
@@ -69,6 +71,7 @@ class Recording:
 
     drive: Drive
     motion: Motion
+    slow: Motion
     mass: float
     draft: Vehicle
     source: TorqueSource
@@ -93,6 +96,7 @@ class Recording:
         return cls(
             drive=drive,
             motion=motion,
+            slow=in_band(motion, draft),
             mass=mass,
             draft=draft,
             source=source,
@@ -130,7 +134,7 @@ class Recording:
 
     def delayed(self, delay: float) -> DelayedRows:
         """Return rows at a delay [s], for a search: what detects brakes is not read anew."""
-        return self._moved(self._anchor(delay, 0.0), self.motion, delay)
+        return self._moved(self._anchor(delay, 0.0), self.slow, delay)
 
     def search(
         self, pairs: Sequence[tuple[float, float]], longest: float, anchor_lag: float
@@ -149,7 +153,7 @@ class Recording:
         longest : of the lags tried [s]
         anchor_lag : lag of the balances that detect brakes and overrun [s]
         """
-        motion = lagged_motion(self.motion, longest)
+        motion = lagged_motion(self.slow, longest)
         late = first_order(self.source.carrier(self.drive).time, self.reading, longest)
         moved: dict[float, DelayedRows] = {}
         for delay, lag in pairs:

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from weighbridge.kernels._jit import fast_kernel
+from weighbridge.kernels._jit import fast_kernel, kernel
 
 
 @fast_kernel
@@ -67,3 +67,55 @@ def lowpass_resample(time, values, start, period, first, reach, out, weight):
         good = nearest[k] > 0.0 and weight[k] > 0.5
         for c in range(channels):
             out[k, c] = out[k, c] / weight[k] if good else np.nan
+
+
+@kernel
+def lowpass_even(values, good, anew, share, reach):
+    """Low-pass channels of an even clock, without delay, each output from its neighbours alone.
+
+    The weights are those of a Hann-windowed ideal low-pass; where samples lack, the others count
+    for all.
+
+    Parameters
+    ----------
+    values : (n, c) float64
+    good : (n,) bool
+        Samples that count; the others stay as they are.
+    anew : (n,) bool
+        The clock begins anew with these.
+    share : float
+        Edge of the low-pass over the rate of the clock [-].
+    reach : int
+        Samples on either side.
+
+    Returns
+    -------
+    (n, c) float64
+    """
+    count, channels = values.shape
+    weights = np.empty(reach + 1)
+    for k in range(reach + 1):
+        angle = 2.0 * math.pi * share * k
+        weights[k] = math.sin(angle) / angle if k > 0 else 1.0
+        weights[k] *= math.cos(0.5 * math.pi * k / (reach + 1)) ** 2
+    out = values.copy()
+    sums = np.empty(channels)
+    for i in range(count):
+        if not good[i]:
+            continue
+        first, last = i, i
+        while first > 0 and i - first < reach and not anew[first]:
+            first -= 1
+        while last < count - 1 and last - i < reach and not anew[last + 1]:
+            last += 1
+        whole = 0.0
+        sums[:] = 0.0
+        for j in range(first, last + 1):
+            if good[j]:
+                w = weights[abs(j - i)]
+                whole += w
+                for c in range(channels):
+                    sums[c] += w * values[j, c]
+        for c in range(channels):
+            out[i, c] = sums[c] / whole
+    return out
