@@ -19,6 +19,9 @@ os.environ.setdefault(
 # As the command line does: threads of BLAS wait for each other longer than they work.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+# Workers return what they have freed: threads of the table readers each keep a heap of their own.
+os.environ.setdefault("MALLOC_ARENA_MAX", "1")
+
 import numpy as np
 import pytest
 

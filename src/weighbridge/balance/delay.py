@@ -15,6 +15,7 @@ from weighbridge.navigation.motion import Motion
 from weighbridge.signals import Drive, Floats
 from weighbridge.signals.correlation import correlation
 from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle.torque import source_signal
 
 EARLIEST: Final = -0.4
 """Torque requested before it acts is early; by more than this only where the motion is late [s]."""
@@ -222,7 +223,11 @@ def _misfit(
     setup = begun.setup
     assert setup is not None
     views = {begun.delay: begun.table}
-    lagged = in_band(lagged_motion(motion, vehicle.timing.torque_lag), vehicle)
+    lagged = in_band(
+        lagged_motion(motion, vehicle.timing.torque_lag),
+        vehicle,
+        source_signal(drive, vehicle).period,
+    )
     for delay in map(float, delays):
         views[delay] = usable_rows(drive, vehicle, motion, lagged, delay, setup)
     # Rows that come and go with the delay would make its misfit rough.

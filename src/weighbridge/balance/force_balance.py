@@ -115,9 +115,8 @@ def force_balance(
     lagged = lagged_motion(motion, lag, since.lagged if since is not None else None)
     if setup is not None:
         engine_delay = setup.engine_delay
-    read = _read(
-        drive, vehicle, in_band(lagged, vehicle), source, delay, engine_delay, setup, since
-    )
+    shown = in_band(lagged, vehicle, source.period)
+    read = _read(drive, vehicle, shown, source, delay, engine_delay, setup, since)
     fill = setup.fill if setup is not None else identify_fill(source)
     brakes, table = _judged(drive, vehicle, motion, source, read, lag, signed, fill, setup)
     if setup is None:
@@ -349,7 +348,7 @@ def dragged_reading(
     for drive, motion in zip(drives, motions, strict=True):
         source = source_signal(drive, vehicle)
         time = source.time - (vehicle.timing.torque_delay or 0.0)
-        lagged = in_band(lagged_motion(motion, vehicle.timing.torque_lag), vehicle)
+        lagged = in_band(lagged_motion(motion, vehicle.timing.torque_lag), vehicle, source.period)
         rows = interpolate_motion(lagged, time)
         pressure = dynamic_pressure(air_density(drive, rows["altitude"]), rows["speed"])
         needed, weight = needed_force(vehicle, rows["specific_force"], pressure)

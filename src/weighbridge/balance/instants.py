@@ -10,6 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from weighbridge.balance.averaging import WINDOW
 from weighbridge.kernels.first_order import even_lag
 from weighbridge.kernels.interpolation import mixed, shares
 from weighbridge.kernels.lowpass import lowpass_even
@@ -55,6 +56,10 @@ sixth of the specific force is above it, and nine tenths of the error of one sam
 to 1.2 Hz the masses of six trucks scatter alike. For cars at 1 Hz it is no gain: 1.2 to 1.7 % RMS
 in eight drives of another simulator."""
 
+ENOUGH_ROWS: Final = 16
+"""So many rows of a window average a vibration themselves, see
+`weighbridge.estimators.joint.slow_errors.MOTION_SHARE`."""
+
 REACH: Final = 0.45
 """Seconds of the motion on either side of a row by which it is known: no more than what goes
 forward with a drive sees of it, and with 1.0 or 1.25 s seven trucks in seven equipments scatter as
@@ -88,7 +93,7 @@ def lagged_motion(motion: Motion, lag: float, before: Motion | None = None) -> M
     )
 
 
-def in_band(motion: Motion, vehicle: Vehicle) -> Motion:
+def in_band(motion: Motion, vehicle: Vehicle, period: float) -> Motion:
     """Take off the vibration of a heavy vehicle that the mean of a window does not keep.
 
     A window has few samples of a torque that comes slowly, and a vibration at their instants is
@@ -96,12 +101,18 @@ def in_band(motion: Motion, vehicle: Vehicle) -> Motion:
     has less of it, and keeps the starts and hills that weigh. The slope of a smoothed speed is such
     a mean already. A car changes its force within half a second, which a mean would lose.
 
+    Parameters
+    ----------
+    motion, vehicle
+    period : between samples of the torque [s]
+
     References
     ----------
     Noise of a regressor: Fuller, Measurement Error Models, 1987, ch. 1; windowed ideal low-pass:
     Oppenheim and Schafer, Discrete-Time Signal Processing, 2010, ch. 7.5.
     """
-    if motion.source in BY_SPEED or not vehicle.of_class.underpowered:
+    heavy = vehicle.of_class.underpowered
+    if motion.source in BY_SPEED or not heavy or period < WINDOW / ENOUGH_ROWS:
         return motion
     columns = (motion.specific_force, motion.accel, motion.grade)
     values = np.column_stack([np.nan_to_num(column) for column in columns])

@@ -96,7 +96,7 @@ class Recording:
         return cls(
             drive=drive,
             motion=motion,
-            slow=in_band(motion, draft),
+            slow=in_band(motion, draft, period),
             mass=mass,
             draft=draft,
             source=source,
