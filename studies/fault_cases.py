@@ -262,7 +262,7 @@ def judge(case: Case, subject: Subject, weighing: Weighing, shared: Sequence[str
     )
     told = (*shared, *weighing.warnings)
     warning = telling(case, subject, told, method) if not right or case.must_tell else ""
-    # A payload that may be nothing need not be told; one that is unknown counts as impossible.
+    # A payload that may be nothing need not be reported; one that is unknown counts as impossible.
     possible = weighing.payload > -FAR_STD * weighing.std
     if case.must_tell and not warning and not possible:
         return Outcome(case, method, "silent", error, std, "nothing reports it")

@@ -68,7 +68,7 @@ class Recorded(NamedTuple):
 
 
 class Result(NamedTuple):
-    """Error and told standard deviation over the true mass [-]; NaN where refused."""
+    """Error and reported standard deviation over the true mass [-]; NaN where refused."""
 
     error: float
     std: float
@@ -290,7 +290,7 @@ def _second_drive(
 
 
 def sheets(first: int, count: int = 6) -> str:
-    """Trucks of the second model by data sheet: J1939 at 5 Hz, brake, retarder and gear told."""
+    """Trucks of the second model by data sheet: J1939 at 5 Hz, with brake, retarder and gear."""
     found = []
     for seed in range(first, first + count):
         truck = second_vehicle("truck", seed)
@@ -329,7 +329,7 @@ def bmw_i3() -> str:
     car = wb.Vehicle.load(EXAMPLES / "bmw-i3" / "vehicle.toml")
     mapping = EXAMPLES / "bmw-i3" / "mapping.toml"
     lines = [
-        "| BMW i3, 24 trips, data sheet | weighed | median kg | off it, median % | told ± % |",
+        "| BMW i3, 24 trips, data sheet | weighed | median kg | off it, median % | reported ± % |",
         "|---|---|---|---|---|",
     ]
     for method in METHODS:
@@ -385,7 +385,7 @@ def canedge() -> str:
 
 
 def single_logs() -> str:
-    """What the truck of 30 s and the car without a torque are told."""
+    """What is reported of the truck of 30 s and of the car without a torque."""
     truck = wb.read_drive(DATA / "j1939-truck" / "normal.log")
     lines = ["| log | what `weigh --method speed-torque-ekf` says |", "|---|---|"]
     w = wb.weigh(truck, EXAMPLES / "j1939-truck" / "vehicle.toml", METHODS[0])

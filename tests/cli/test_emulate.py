@@ -3,29 +3,19 @@
 import json
 import shlex
 import signal
-import socket
 import subprocess
 import sys
 import time
 
 import pytest
 from tests.noted import named
+from tests.ports import free_ports
 
 from weighbridge import read_drive
 from weighbridge.io import write_drive
 
 RATE = 8.0
 PROGRAM = (sys.executable, "-m", "weighbridge")
-
-
-def free_ports():
-    with (
-        socket.create_server(("127.0.0.1", 0)) as a,
-        socket.create_server(("127.0.0.1", 0)) as b,
-        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as c,
-    ):
-        c.bind(("127.0.0.1", 0))
-        return tuple(s.getsockname()[1] for s in (a, b, c))
 
 
 def newest(lines):
@@ -40,7 +30,7 @@ def test_from_an_emulated_dongle_to_a_mass(loaded, car, tmp_path):
     drive = read_drive(loaded.folder)
     set_off = float(drive.speed.time[drive.speed.values > 0.0][0])
     write_drive(drive.between(set_off - 5.0, drive.end), tmp_path / "moving")
-    elm, nmea, lines = free_ports()
+    elm, nmea, lines = free_ports().values()
     told = tmp_path / "live.jsonl"
     emulate = [*PROGRAM, "emulate", str(tmp_path / "moving"), "--rate", f"{RATE:g}"]
     emulate += ["--elm", f"{elm}", "--nmea", f"{nmea}", "--lines", f"{lines}"]

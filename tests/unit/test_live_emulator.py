@@ -10,6 +10,7 @@ from threading import Event
 import numpy as np
 import pytest
 from tests.noted import error
+from tests.ports import free_ports
 
 from weighbridge import ConfigError, Drive, DriveError, Signal
 from weighbridge.errors import SourceError
@@ -56,17 +57,6 @@ def made(*left_out):
 @pytest.fixture(scope="module")
 def drive():
     return made()
-
-
-def free_ports():
-    with (
-        socket.create_server(("127.0.0.1", 0)) as a,
-        socket.create_server(("127.0.0.1", 0)) as b,
-        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as c,
-    ):
-        c.bind(("127.0.0.1", 0))
-        names = ("adapter", "receiver", "sensor")
-        return {n: s.getsockname()[1] for n, s in zip(names, (a, b, c), strict=True)}
 
 
 @contextmanager

@@ -18,6 +18,7 @@ from weighbridge.arguments import check_number
 from weighbridge.balance import forward as force_rows
 from weighbridge.balance.averaging import WINDOW, window_params
 from weighbridge.balance.force_balance import ForceState
+from weighbridge.balance.instants import REACH
 from weighbridge.balance.law import accessory_column
 from weighbridge.balance.table import ForceTable
 from weighbridge.errors import ConfigError, DriveError
@@ -44,7 +45,7 @@ if TYPE_CHECKING:
     from weighbridge.navigation.identify.setup import Setup
     from weighbridge.pipeline.weighing import Weighing
 
-AHEAD: Final = 0.45
+AHEAD: Final = REACH
 """The force side looks so far past a row at the motion, and twice as far at the readings [s]. What
 the motion itself looks at is `weighbridge.navigation.forward.lateness`."""
 

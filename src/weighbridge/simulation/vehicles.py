@@ -437,8 +437,8 @@ def random_habits(rng: np.random.Generator) -> Habits:
 
     Notes
     -----
-    How often and how lightly drivers brake is fitted to a recorded car with a brake switch, 20
-    115 s at 1 Hz, ten drivers: 0.02 to 0.12 touches a second, of 0.05 to 0.15 m/s^2, for 0.5 to
+    How often and how lightly drivers brake is fitted to a recorded car with a brake switch,
+    20 115 s at 1 Hz, ten drivers: 0.02 to 0.12 touches a second, of 0.05 to 0.15 m/s^2, for 0.5 to
     1.5 s. Its light braking is at 1 to 2 bar, some percent of the weight. The foot needs 0.2 s
     between the pedals when it has to and 0.6 s when it need not hurry (Green, Transportation
     Human Factors 2(3), 2000, on movement times). Air drag behind another vehicle is 5 to 25 %
