@@ -35,6 +35,7 @@ def page(tmp_path_factory):
     learnt = {
         "vehicle_id": "truck2", "drives": 4, "weighed": 4, "error_pct": 12.34, "error_std_pct": 4.0,
         "contradicted": True, "refined": "truck2.toml", "findings": "4 drives contradict the file",
+        "factor": 0.961, "factor_std": 0.015, "factor_reason": "its empty runs show it",
     }  # fmt: skip
     write_learnt(folder, [learnt])
     path = home / "fleet.html"
@@ -96,6 +97,9 @@ def test_a_vehicle_has_its_history_by_a_click(tab):
     inked = "c => c.getContext('2d').getImageData(0, 0, c.width, c.height).data.some(x => x > 0)"
     assert tab.locator("#history canvas").evaluate(inked)
     assert column(tab, "learnt", "mean error, %") == ["+12.3 ± 7.8"]
+    assert column(tab, "learnt", "masses changed, %") == ["-3.9 ± 2.9"]
+    sentences = ["4 drives contradict the file; its empty runs show it"]
+    assert column(tab, "learnt", "what was found") == sentences
 
 
 def test_nothing_scrolls_sideways_but_tables_in_their_frames(tab):

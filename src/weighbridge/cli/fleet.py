@@ -114,7 +114,11 @@ _Kind = Annotated[
 ]
 _Learn = Annotated[
     Optional[Path],  # noqa: UP045
-    typer.Option("--learn", help="Folder for vehicle files refined by drives of known mass."),
+    typer.Option(
+        "--learn",
+        help="Correct masses by what the fleet shows of each vehicle's scale; folder for vehicle "
+        "files refined by --tickets.",
+    ),
 ]
 _Tickets = Annotated[
     Optional[Path],  # noqa: UP045
@@ -292,7 +296,9 @@ def _count(number: int, word: str, words: str | None = None) -> str:
 def _say_learnt(results: Path, learn: Path) -> None:
     from weighbridge.fleet.learnt import read_learnt
 
-    for row in read_learnt(results).iter_rows(named=True):
+    learnt = read_learnt(results)
+    fleet_report.say_scales(learnt)
+    for row in learnt.filter(learnt["drives"] > 0).iter_rows(named=True):
         refined = f"refined: {learn / row['refined']}" if row["refined"] else "not refined"
         say(f"{row['vehicle_id']}: {row['drives']} drives with a ticket, {refined}")
         if row["findings"]:

@@ -185,6 +185,8 @@ def _say_outside(outside: pl.DataFrame) -> None:
 
 def _say_learnt(learnt: pl.DataFrame) -> None:
     """Report vehicles whose drives of known mass contradict their file, or that drift."""
+    say_scales(learnt)
+    learnt = learnt.filter(learnt["drives"] > 0)
     if learnt.is_empty():
         return
     of = "1 vehicle" if learnt.height == 1 else f"{learnt.height} vehicles"
@@ -200,3 +202,27 @@ def _say_learnt(learnt: pl.DataFrame) -> None:
     more = questionable.height - _REPORTED
     if more > 0:
         say(f"  and {more} more: -o fleet.html has all")
+
+
+def say_scales(learnt: pl.DataFrame) -> None:
+    """Say by how much masses are corrected, and which vehicles seem never to be empty.
+
+    Parameters
+    ----------
+    learnt : as of `weighbridge.fleet.learnt.read_learnt`
+    """
+    scaled = learnt.filter(learnt["factor"].is_not_null())
+    if scaled.is_empty():
+        return
+    of = "1 vehicle" if scaled.height == 1 else f"{scaled.height} vehicles"
+    changes = [100.0 * (factor - 1.0) for factor in scaled["factor"]]
+    say(
+        f"masses of {of} are corrected by what the fleet shows of their scale: by "
+        f"{min(changes):+.1f} to {max(changes):+.1f} %"
+    )
+    never = scaled.filter(scaled["verdict"] == "never empty")
+    for row in never.head(_REPORTED).iter_rows(named=True):
+        say(f"  {row['vehicle_id']}: {row['factor_reason']}")
+    more = never.height - _REPORTED
+    if more > 0:
+        say(f"  and {more} more that are never empty: -o fleet.html has all")

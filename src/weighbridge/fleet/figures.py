@@ -29,10 +29,10 @@ def per_vehicle(legs: pl.DataFrame, changes: pl.DataFrame) -> pl.DataFrame:
     Returns
     -------
     polars.DataFrame
-        ``vehicle_id``, ``vehicle_class``, ``has_file``, ``tare_kg``, ``gross_kg``, ``drives``,
-        ``legs``, ``distance_km``, ``known_km`` (with a mass), ``known_share``, ``tkm``,
-        ``tkm_std``, ``tkm_shared`` (part of it from the vehicle file), ``payload_km`` (with a
-        payload), ``mean_payload_kg`` (by distance), ``mean_payload_std_kg``,
+        ``vehicle_id``, ``vehicle_class``, ``type``, ``has_file``, ``tare_kg``, ``gross_kg``,
+        ``drives``, ``legs``, ``distance_km``, ``known_km`` (with a mass), ``known_share``, ``tkm``,
+        ``tkm_std``, ``tkm_shared`` (part of it that its class or type shares), ``payload_km``
+        (with a payload), ``mean_payload_kg`` (by distance), ``mean_payload_std_kg``,
         ``empty_km``, ``empty_share``, ``warnings``,
         ``alarms`` (legs), ``worst_overload``, ``trailer_legs``, ``changes``, ``last_kg``,
         ``last_std_kg``, ``last_time``.
@@ -43,10 +43,11 @@ def per_vehicle(legs: pl.DataFrame, changes: pl.DataFrame) -> pl.DataFrame:
     own = (pl.col("std_kg").pow(2) - pl.col("shared_kg").fill_null(0.0).pow(2)).clip(0.0)
     tonnes = 1e-3 * way
     shared = (tonnes * pl.col("shared_kg").fill_null(0.0)).filter(paid).sum()
+    common = (tonnes * pl.col("common_kg").fill_null(0.0)).filter(paid).sum()
     alone = (tonnes.pow(2) * own).filter(paid).sum()
     last = pl.col("mass_kg", "std_kg", "start").filter(known).last()
     found = legs.group_by("vehicle_id", maintain_order=True).agg(
-        pl.col("vehicle_class").drop_nulls().last(),
+        pl.col("vehicle_class", "type").drop_nulls().last(),
         pl.col("vehicle_file").is_not_null().any().alias("has_file"),
         pl.col("tare_kg", "gross_kg").drop_nulls().last(),
         pl.struct("key", "part").n_unique().cast(pl.Int64).alias("drives"),
@@ -56,7 +57,7 @@ def per_vehicle(legs: pl.DataFrame, changes: pl.DataFrame) -> pl.DataFrame:
         # The sum of no payloads is not known, and is not nothing.
         pl.when(paid.any()).then(pl.col("tkm").sum()).alias("tkm"),
         pl.when(paid.any()).then((shared.pow(2) + alone).sqrt()).alias("tkm_std"),
-        pl.when(paid.any()).then(shared).alias("tkm_shared"),
+        pl.when(paid.any()).then(common).alias("tkm_shared"),
         way.filter(paid).sum().alias("payload_km"),
         (pl.col("payload_kg") * way).filter(paid).sum().alias("load_km"),
         way.filter(pl.col("empty").fill_null(value=False)).sum().alias("empty_km"),
@@ -87,8 +88,9 @@ def per_vehicle(legs: pl.DataFrame, changes: pl.DataFrame) -> pl.DataFrame:
 def totals(vehicles: pl.DataFrame) -> dict[str, Any]:
     """Return the sums over all vehicles.
 
-    Vehicle files from data sheets err alike within a class: what they add to the transport adds up
-    as it is. Classes, and the errors of legs by themselves, add up by their squares.
+    What vehicles share of their errors adds up as it is: those of a class all that a data sheet
+    leaves, those of a type its error where the fleet showed their scales. Classes, types, and all
+    other errors, add up by their squares.
 
     Parameters
     ----------
@@ -99,7 +101,9 @@ def totals(vehicles: pl.DataFrame) -> dict[str, Any]:
     found: dict[str, Any] = {"vehicles": vehicles.height}
     found |= {name: int(vehicles[name].sum()) for name in counted}
     found |= {name: float(vehicles[name].sum()) for name in summed}
-    shared = vehicles.group_by("vehicle_class").agg(pl.col("tkm_shared").sum())["tkm_shared"]
+    shared = vehicles.group_by("vehicle_class", "type").agg(pl.col("tkm_shared").sum())[
+        "tkm_shared"
+    ]
     alone = vehicles["tkm_std"] ** 2 - vehicles["tkm_shared"] ** 2
     found["tkm_std"] = math.sqrt(float((shared**2).sum()) + float(alone.sum()))
     for name, part, whole in (

@@ -313,6 +313,7 @@ def _row(job: Job, outcome: str, reason: Problem | None = None) -> dict[str, Any
         "outcome": outcome,
         "vehicle_id": assigned.id,
         "vehicle_file": assigned.file,
+        "vehicle_digest": assigned.digest,
     }
 
 

@@ -1,4 +1,4 @@
-"""Vehicle files refined by the drives of known mass that a fleet has, and what drifts in them."""
+"""What a fleet teaches: scales of its vehicles, and files refined by its drives of known mass."""
 
 from __future__ import annotations
 
@@ -18,7 +18,8 @@ from weighbridge.fleet.inputs import Recording
 from weighbridge.fleet.job import TRIES, drives_of, local_paths, named_error
 from weighbridge.fleet.learnt import COLUMNS, LEARNT, SURE
 from weighbridge.fleet.remote import by_url
-from weighbridge.fleet.tickets import read_tickets, ticketed
+from weighbridge.fleet.scales import Weighed, find_scales
+from weighbridge.fleet.tickets import read_tickets, ticketed, with_tickets
 from weighbridge.fleet.vehicles import Assigned, Vehicles
 from weighbridge.messages import Problem
 from weighbridge.pipeline.given import mapping_beside
@@ -87,26 +88,27 @@ def learn_fleet(
     client: Client,
     results: Path,
     shelf: Vehicles,
-    tickets: Path,
+    tickets: Path | None,
     output: Path,
     *,
     whole: bool,
     dbc: Sequence[str] = (),
 ) -> pl.DataFrame:
-    """Refine the vehicle files of a fleet by its tickets.
+    """Find the scales of a fleet's vehicles, and refine their files where there are tickets.
 
     Parameters
     ----------
     client : of a Dask cluster
     results : folder of weighed drives
     shelf : the vehicle files
-    tickets : table of them
+    tickets : table of them; None where there is none, and no file is refined
     output : folder of the refined files, none of the old ones
     whole, dbc : as the drives were weighed
 
     Returns
     -------
-    One row per vehicle, see `learn_vehicle`; it is also in the results as ``learnt.parquet``
+    One row per vehicle, see `learn_vehicle` and `learn_scales`; it is also in the results as
+    ``learnt.parquet``
 
     Raises
     ------
@@ -118,28 +120,134 @@ def learn_fleet(
     from weighbridge.fleet.reading import read_drives
 
     refuse_output(output, shelf)
-    found = ticketed(read_tickets(tickets), read_drives(results))
-    output.mkdir(parents=True, exist_ok=True)
-    lessons = []
-    for (vehicle,), own in found.partition_by("vehicle_id", as_dict=True).items():
-        assigned = shelf.of((str(vehicle),), str(vehicle))
-        if assigned.vehicle is not None:
-            known = tuple(_known(row) for row in own.iter_rows(named=True))
-            lessons.append(
-                Lesson(
-                    assigned=assigned,
-                    drives=known,
-                    output=str(output.resolve()),
-                    whole=whole,
-                    dbc=tuple(dbc),
+    rows: list[dict[str, Any]] = []
+    if tickets is not None:
+        found = ticketed(read_tickets(tickets), read_drives(results))
+        output.mkdir(parents=True, exist_ok=True)
+        lessons = []
+        for (vehicle,), own in found.partition_by("vehicle_id", as_dict=True).items():
+            assigned = shelf.of((str(vehicle),), str(vehicle))
+            if assigned.vehicle is not None:
+                known = tuple(_known(row) for row in own.iter_rows(named=True))
+                lessons.append(
+                    Lesson(
+                        assigned=assigned,
+                        drives=known,
+                        output=str(output.resolve()),
+                        whole=whole,
+                        dbc=tuple(dbc),
+                    )
                 )
-            )
-    with scheduler_needed(client):
-        rows = _learnt(client, lessons)
-    frame = pl.DataFrame(rows, schema=COLUMNS, orient="row").sort("vehicle_id")
-    with whole_file(results / LEARNT) as part:
-        frame.write_parquet(part)
+        with scheduler_needed(client):
+            rows = _learnt(client, lessons)
+    return learn_scales(results, shelf, tickets, rows)
+
+
+def learn_scales(
+    results: Path,
+    shelf: Vehicles,
+    tickets: Path | None = None,
+    refined: Sequence[Mapping[str, Any]] = (),
+) -> pl.DataFrame:
+    """Find the scales of the vehicles that have a file, see `weighbridge.fleet.scales`.
+
+    Drives that were weighed with another file of their vehicle do not count.
+
+    Parameters
+    ----------
+    results : folder of weighed drives
+    shelf : the vehicle files
+    tickets : table of them; None where there is none
+    refined : rows of `learn_vehicle`
+
+    Returns
+    -------
+    polars.DataFrame
+        One row per vehicle with the columns `weighbridge.fleet.learnt.COLUMNS`; it is also in the
+        results as ``learnt.parquet``.
+
+    Raises
+    ------
+    ConfigError
+        Tickets cannot be read, or the results not be written to.
+    """
+    from weighbridge.fleet.legs import legs
+    from weighbridge.fleet.reading import collected, read_drives, read_segments
+
+    drives, segments = (collected(read(results), results) for read in (read_drives, read_segments))
+    digests = {path.stem: shelf.of((), path.stem).digest for path in shelf.files}
+    rows = legs(drives, segments).join(
+        drives.select("key", "part", "vehicle_digest"), on=["key", "part"]
+    )
+    current = pl.DataFrame(
+        list(digests.items()), schema={"vehicle_id": pl.String, "vehicle_digest": pl.String},
+        orient="row",
+    )  # fmt: skip
+    rows = rows.join(current, on=["vehicle_id", "vehicle_digest"], how="semi")
+    rows = rows.filter(pl.col("mass_kg") > 0.0)
+    told = [] if tickets is None else read_tickets(tickets)
+    known = with_tickets(rows, told).select("key", "part", "leg", "ticket_kg")
+    rows = rows.join(known, on=["key", "part", "leg"], how="left")
+    fleet = [
+        _weighed(str(vehicle), car, own)
+        for (vehicle,), own in rows.partition_by("vehicle_id", as_dict=True).items()
+        if (car := shelf.of((), str(vehicle)).vehicle) is not None
+    ]
+    scales = pl.DataFrame(
+        [
+            {
+                "vehicle_id": scale.vehicle,
+                "vehicle_digest": digests[scale.vehicle],
+                "type": scale.type,
+                "factor": scale.factor,
+                "factor_std": scale.std,
+                "factor_common_std": scale.common_std,
+                "factor_legs": scale.legs,
+                "factor_reason_id": scale.reason.id,
+                "factor_reason": scale.reason.text,
+            }
+            for scale in find_scales(fleet)
+        ],
+        schema={name: COLUMNS[name] for name in ("vehicle_id", *_OF_SCALE)},
+    )
+    taught = pl.DataFrame(list(refined), schema=COLUMNS, orient="row").drop(_OF_SCALE)
+    frame = taught.join(scales, on="vehicle_id", how="full", coalesce=True)
+    frame = frame.with_columns(pl.col("drives", "weighed").fill_null(0)).select(list(COLUMNS))
+    frame = frame.sort("vehicle_id")
+    path = results / LEARNT
+    # Written only where it changed: the legs are made anew after it.
+    if not (path.exists() and pl.read_parquet(path).equals(frame)):
+        with whole_file(path) as part:
+            frame.write_parquet(part)
     return frame
+
+
+_OF_SCALE: Final = tuple(COLUMNS)[list(COLUMNS).index("vehicle_digest") :]
+
+
+def _weighed(name: str, car: Vehicle, rows: pl.DataFrame) -> Weighed:
+    """Return what a vehicle's legs show of its scale.
+
+    Vehicles of one type, or of one class where their files name none, share their errors. Those
+    whose torque was calibrated share them among themselves.
+    """
+    mass, std, shared, known = (
+        rows[name].fill_null(math.nan).to_numpy()
+        for name in ("mass_kg", "std_kg", "shared_kg", "ticket_kg")
+    )
+    calibrated = car.provenance.mass_scale_std is not None
+    tare = math.nan if car.tare is None else car.tare
+    return Weighed(
+        vehicle=name,
+        type=f"{car.type or car.kind}{', calibrated' if calibrated else ''}",
+        mass=mass,
+        own=np.sqrt(np.maximum(std**2 - shared**2, 0.0)) / mass,
+        known=known,
+        shared=float(np.median(shared / mass)),
+        tare=tare,
+        gross=tare * car.of_class.loaded if car.gross is None else car.gross,
+        emptied=car.of_class.emptied,
+    )
 
 
 def _learnt(client: Client, lessons: Sequence[Lesson]) -> list[dict[str, Any]]:

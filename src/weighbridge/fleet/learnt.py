@@ -31,10 +31,20 @@ COLUMNS: Final[dict[str, Any]] = {
     "pitch_drift_std_deg": pl.Float64,
     "refined": pl.String,
     "findings": pl.String,
+    "vehicle_digest": pl.String,
+    "type": pl.String,
+    "factor": pl.Float64,
+    "factor_std": pl.Float64,
+    "factor_common_std": pl.Float64,
+    "factor_legs": pl.Int32,
+    "factor_reason_id": pl.String,
+    "factor_reason": pl.String,
 }
 """Columns of what was learnt of a vehicle: drives with a ticket, those with a mass, how far these
 are from their tickets in the mean (positive: too heavy) and how far they may be; drifts per 30
-days; name of the refined file, and sentences."""
+days; name of the refined file, and sentences. Then what the fleet showed of its scale: digest of
+the vehicle file that the drives were weighed with, type, true over weighed mass with its standard
+deviation and the part that its type shares [-], legs with a mass, and why it is so."""
 
 EARLIER: Final = "told"
 """Name of the findings in a table of earlier versions."""
@@ -56,8 +66,8 @@ def read_learnt(results: str | Path) -> pl.DataFrame:
     Returns
     -------
     polars.DataFrame
-        `COLUMNS`, ``drifts`` (whether a drift is sure) and ``verdict`` (contradicted, drifts, not
-        refined, refined: the first that is so); no row where no run had tickets.
+        `COLUMNS`, ``drifts`` (whether a drift is sure) and ``verdict`` (contradicted, drifts, never
+        empty, not refined, refined, scaled: the first that is so); no row where nothing was learnt.
 
     Raises
     ------
@@ -70,7 +80,9 @@ def read_learnt(results: str | Path) -> pl.DataFrame:
             found = pl.read_parquet(file)
             if EARLIER in found.columns:
                 found = found.rename({EARLIER: "findings"})
-            rows = found.select(list(COLUMNS))
+            # Tables of earlier versions lack columns.
+            empty = pl.DataFrame(schema=COLUMNS)
+            rows = pl.concat([empty, found], how="diagonal_relaxed").select(list(COLUMNS))
     except FileNotFoundError:
         rows = pl.DataFrame(schema=COLUMNS)
     except (*PARSE_ERRORS, OSError) as error:
@@ -86,12 +98,62 @@ def read_learnt(results: str | Path) -> pl.DataFrame:
     verdict = (
         pl.when(contradicted).then(pl.lit("contradicted"))
         .when("drifts").then(pl.lit("drifts"))
-        .when(pl.col("refined").is_null()).then(pl.lit("not refined"))
-        .otherwise(pl.lit("refined"))
+        .when(pl.col("factor_reason_id").is_in(["fleet.scale_wrong", "fleet.scale_never"]))
+        .then(pl.lit("never empty"))
+        .when(pl.col("refined").is_not_null()).then(pl.lit("refined"))
+        .when(pl.col("drives") > 0).then(pl.lit("not refined"))
+        .otherwise(pl.lit("scaled"))
     )  # fmt: skip
-    rank = {"contradicted": 0, "drifts": 1, "not refined": 2, "refined": 3}
+    order = ("contradicted", "drifts", "never empty", "not refined", "refined", "scaled")
+    rank = {name: number for number, name in enumerate(order)}
     return (
         rows.with_columns(contradicted, drifts=drifts.fill_null(value=False))
         .with_columns(verdict=verdict)
         .sort(pl.col("verdict").replace_strict(rank, return_dtype=pl.Int8), "vehicle_id")
     )
+
+
+def with_factors(
+    drives: pl.DataFrame, segments: pl.DataFrame, learnt: pl.DataFrame | None = None
+) -> tuple[pl.DataFrame, pl.DataFrame]:
+    """Multiply masses by the factors of their vehicles.
+
+    A factor holds for drives that were weighed with the vehicle file that it was learnt of.
+
+    Parameters
+    ----------
+    drives, segments : as of `weighbridge.fleet.read_drives` and `read_segments`, collected
+    learnt : as of `read_learnt`
+
+    Returns
+    -------
+    drives, segments
+        Their ``mass_kg``, ``std_kg`` and ``systematic_std_kg`` are corrected, ``weighed_kg`` and
+        ``weighed_std_kg`` are as they were. ``factor`` is null where none was learnt, and
+        ``common_kg`` is the part of ``systematic_std_kg`` that vehicles share.
+    """
+    names = ["vehicle_id", "vehicle_digest", "factor", "type", "factor_std", "factor_common_std"]
+    found = pl.DataFrame(schema={name: COLUMNS[name] for name in names})
+    if learnt is not None:
+        found = learnt.select(names).drop_nulls(names[:3])
+    none, std = pl.col("factor").is_null(), pl.col("std_kg")
+    mass = pl.col("mass_kg").fill_nan(None)
+    own = (std.pow(2) - (pl.col("share") * mass).pow(2)).clip(0.0)
+    total = pl.col("factor") * (own + (pl.col("factor_std") * mass).pow(2)).sqrt()
+    both = {
+        "weighed_kg": mass,
+        "weighed_std_kg": std,
+        "mass_kg": pl.when(none).then(mass).otherwise(pl.col("factor") * mass),
+        "std_kg": pl.when(none).then(std).otherwise(total),
+    }
+    shared = pl.col("systematic_std_kg")
+    drives = drives.with_columns(share=shared / mass)
+    drives = drives.join(found, on=names[:2], how="left", maintain_order="left")
+    of = drives.select("key", "part", "share", *names[2:])
+    segments = segments.join(of, on=["key", "part"], how="left", maintain_order="left")
+    drives = drives.with_columns(**both).with_columns(
+        systematic_std_kg=pl.when(none).then(shared).otherwise(pl.col("factor_std") * mass),
+        common_kg=pl.when(none).then(shared).otherwise(pl.col("factor_common_std") * mass),
+    )
+    segments = segments.with_columns(**both)
+    return drives.drop("share", *names[4:]), segments.drop("share", *names[2:])

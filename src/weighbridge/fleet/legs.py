@@ -11,6 +11,7 @@ from scipy.special import stdtr, stdtrit
 
 from weighbridge.errors import ConfigError
 from weighbridge.fleet.couplings import Coupling, with_couplings
+from weighbridge.fleet.learnt import with_factors
 from weighbridge.fleet.schema import LEGS
 from weighbridge.fleet.unjudged import with_causes
 from weighbridge.messages import Problem
@@ -24,9 +25,11 @@ _POSITION: Final = tuple(
 )
 _OF_DRIVE: Final = (
     "key", "part", "date", "source", "drive", "outcome", "vehicle_id", "vehicle_file",
-    "vehicle_class", "tare_kg", "gross_kg", "status", "reason_id", "reason", "freedom",
+    "vehicle_class", "tare_kg", "gross_kg", "status", "reason_id", "reason", "freedom", "type",
+    "factor",
 )  # fmt: skip
-_OF_LEG: Final = ("mass_kg", "std_kg", "distance_km", "moving_s", *_POSITION)
+_MASS: Final = ("mass_kg", "std_kg", "weighed_kg", "weighed_std_kg")
+_OF_LEG: Final = (*_MASS, "distance_km", "moving_s", *_POSITION)
 
 
 class Limits(NamedTuple):
@@ -70,6 +73,7 @@ def legs(
     segments: pl.DataFrame,
     limits: Limits | None = None,
     couplings: Sequence[Coupling] = (),
+    learnt: pl.DataFrame | None = None,
 ) -> pl.DataFrame:
     """Return one row per leg, in order of vehicle and time.
 
@@ -81,6 +85,7 @@ def legs(
     drives, segments : as of `read_drives` and `read_segments`, collected
     limits : as of `Limits`
     couplings : of trailers, where the fleet knows them
+    learnt : as of `weighbridge.fleet.learnt.read_learnt`, whose factors masses are multiplied by
 
     Returns
     -------
@@ -94,8 +99,12 @@ def legs(
     """
     limits = limits or Limits()
     check_limits(limits)
+    drives, segments = with_factors(drives, segments, learnt)
     drive_scale = pl.col("systematic_std_kg") / pl.col("mass_kg")
-    kept: list[str | pl.Expr] = [*_OF_DRIVE, "start", drive_scale.alias("scale")]
+    common = pl.col("common_kg") / pl.col("mass_kg")
+    kept: list[str | pl.Expr] = [
+        *_OF_DRIVE, "start", drive_scale.alias("scale"), common.alias("common"),
+    ]  # fmt: skip
     changed = pl.col("load_changed").fill_null(value=False)
     several = changed | (pl.col("unweighed_s") > 0.0).fill_null(value=False)
     whole = drives.filter(~several).select(
@@ -103,15 +112,16 @@ def legs(
     )
     of = drives.filter(several).select(
         *kept, changed.alias("changed"),
-        pl.col("mass_kg").alias("drive_mass"), pl.col("std_kg").alias("drive_std"),
+        *(pl.col(name).alias(f"drive_{name}") for name in _MASS),
     )  # fmt: skip
     split = of.join(segments, on=["key", "part"]).pipe(_parted).select(whole.columns)
     found = pl.concat([whole, split]).with_columns(
         end=pl.col("start") + _seconds(pl.col("duration_s")),
         shared_kg=(pl.col("scale") * pl.col("mass_kg")).clip(upper_bound=pl.col("std_kg")),
+        common_kg=(pl.col("common") * pl.col("mass_kg")).clip(upper_bound=pl.col("std_kg")),
         payload_kg=pl.col("mass_kg") - pl.col("tare_kg"),
     )
-    found = _judged(with_couplings(found.drop("scale"), couplings), limits)
+    found = _judged(with_couplings(found.drop("scale", "common"), couplings), limits)
     found = with_causes(found, "permitted_kg").select(list(LEGS))
     return found.sort("vehicle_id", "start", "source", "leg", nulls_last=True)
 
@@ -128,8 +138,10 @@ def _parted(rows: pl.DataFrame) -> pl.DataFrame:
         reason_id=pl.when(bare).then(pl.lit(unknown.id)).otherwise("reason_id"),
         reason=pl.when(bare).then(pl.lit(unknown.text)).otherwise("reason"),
         # One load has the mass of its drive, whatever its segments have.
-        mass_kg=pl.when(pl.col("changed") | bare).then("mass_kg").otherwise("drive_mass"),
-        std_kg=pl.when(pl.col("changed") | bare).then("std_kg").otherwise("drive_std"),
+        **{
+            name: pl.when(pl.col("changed") | bare).then(name).otherwise(f"drive_{name}")
+            for name in _MASS
+        },
     )
     summed, last = ("distance_km", "moving_s", "duration_s"), _POSITION[2:]
     first = [n for n in rows.columns if n not in (*drive, "leg", *summed, *last)]

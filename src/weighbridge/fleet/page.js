@@ -349,20 +349,21 @@ function quality() {
 }
 
 function learnt() {
-  const rank = { contradicted: 3, drifts: 2, "not refined": 1, refined: 0 };
+  const rank = { contradicted: 5, drifts: 4, "never empty": 3, "not refined": 2, refined: 1, scaled: 0 };
   const spread = (x, std, digits) => (x === null ? "–" : `${x > 0 ? "+" : ""}${x.toFixed(digits)} ±\u00a0${(1.96 * std).toFixed(digits)}`);
   const drift = (head, name, std, digits) =>
     ({ head, value: of(G[name]), show: (x, k) => spread(x, G[std][k], digits), kind: "n" });
   table("learnt", G.v.length, [
     named(G.v),
     { head: "verdict", value: (k) => rank[G.verdict[k]], show: (_, k) => G.verdict[k],
-      mark: (k) => (rank[G.verdict[k]] > 1 ? ["alarm-text"] : []) },
+      mark: (k) => (rank[G.verdict[k]] > 3 ? ["alarm-text"] : []) },
+    drift("masses changed, %", "change_pct", "change_std_pct", 1),
+    { head: "what was found", value: of(G.findings), kind: "w" },
     { head: "drives", value: of(G.drives), kind: "n" },
     drift("mean error, %", "error_pct", "error_std_pct", 1),
     drift("torque scale, %", "torque_drift_pct", "torque_drift_std_pct", 1),
     drift("rolling", "rolling_drift", "rolling_drift_std", 4),
     drift("pitch, deg", "pitch_drift_deg", "pitch_drift_std_deg", 2),
-    { head: "what was found", value: of(G.findings), kind: "w" },
   ], [1, true]);
 }
 

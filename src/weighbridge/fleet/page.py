@@ -36,8 +36,9 @@ _SECTIONS: Final = (
     ("quality", "Data quality", "What keeps drives from being weighed, and what is uncertain."),
     (
         "learnt",
-        "Learnt from tickets",
-        "Vehicle files that their drives contradict, and what drifts in 30 days.",
+        "Learnt from the fleet",
+        "Factors by which masses are corrected, vehicle files that tickets contradict, and what "
+        "drifts in 30 days.",
     ),
     ("verdicts", "Known masses", "Verdicts by the loads of Regulation (EU) 2019/1213, Annex IV."),
 )
@@ -288,9 +289,18 @@ def _data(report: FleetReport) -> dict[str, Any]:
         ),
         # The drives of one may have been removed since.
         "learnt": columns(
-            report.learnt.filter(pl.col("vehicle_id").is_in(ids)),
-            {"verdict": 0, "drives": 0, "error_pct": 1, "error_std_pct": 1, "torque_drift_pct": 1,
-             "torque_drift_std_pct": 1, "rolling_drift": 5, "rolling_drift_std": 5,
+            report.learnt.filter(pl.col("vehicle_id").is_in(ids)).with_columns(
+                change_pct=100.0 * (pl.col("factor") - 1.0),
+                change_std_pct=100.0 * pl.col("factor_std"),
+                findings=pl.concat_str(
+                    pl.col("findings", "factor_reason").replace("", None),
+                    separator="; ",
+                    ignore_nulls=True,
+                )
+            ),
+            {"verdict": 0, "change_pct": 1, "change_std_pct": 1, "drives": 0, "error_pct": 1,
+             "error_std_pct": 1, "torque_drift_pct": 1, "torque_drift_std_pct": 1,
+             "rolling_drift": 5, "rolling_drift_std": 5,
              "pitch_drift_deg": 2, "pitch_drift_std_deg": 2, "findings": 0},
         ),
         "verdicts": columns(

@@ -12,7 +12,7 @@ import polars as pl
 from weighbridge.errors import ConfigError
 from weighbridge.fleet import figures, protocol
 from weighbridge.fleet.couplings import read_couplings
-from weighbridge.fleet.learnt import read_learnt
+from weighbridge.fleet.learnt import read_learnt, with_factors
 from weighbridge.fleet.legs import Limits, legs, load_changes
 from weighbridge.fleet.reading import collected, read_drives, read_segments
 from weighbridge.fleet.tickets import read_tickets
@@ -41,7 +41,7 @@ class FleetReport:
     outside : known masses outside their intervals, see `weighbridge.fleet.protocol.outside`
     verdicts : of the protocol, see `weighbridge.fleet.protocol.verdicts`
     rfms : last masses, see `weighbridge.fleet.figures.rfms`
-    learnt : from drives of known mass, see `weighbridge.fleet.learnt.read_learnt`
+    learnt : from fleet and tickets, see `weighbridge.fleet.learnt.read_learnt`
     """
 
     limits: Limits
@@ -143,10 +143,12 @@ def report(
     reported = [] if tickets is None else read_tickets(Path(tickets))
     drives, segments = (collected(read(results), results) for read in (read_drives, read_segments))
     coupled = [] if couplings is None else read_couplings(Path(couplings))
-    rows = legs(drives, segments, limits, coupled)
+    learnt = read_learnt(results)
+    rows = legs(drives, segments, limits, coupled, learnt)
     changes = load_changes(rows)
     vehicles = figures.per_vehicle(rows, changes)
-    known = protocol.known_masses(rows, drives, reported)
+    # Tickets may have made the factors: they are compared with what was weighed.
+    known = protocol.known_masses(legs(drives, segments, limits, coupled), drives, reported)
     out = protocol.outside(known)
     return FleetReport(
         limits=limits,
@@ -162,11 +164,11 @@ def report(
         },
         unjudged=unjudged(rows),
         quality=figures.quality(drives),
-        speed_mass=figures.speed_mass(drives, segments),
+        speed_mass=figures.speed_mass(*with_factors(drives, segments, learnt)),
         outside=out,
         verdicts=protocol.verdicts(known, tolerance),
         rfms=figures.rfms(rows),
-        learnt=read_learnt(results),
+        learnt=learnt,
     )
 
 

@@ -50,7 +50,7 @@ class FleetSettings:
     workers : their number; None for one per core
     memory : limit of each, such as ``"1 GB"``
     learn : folder for refined vehicle files; None to learn nothing
-    tickets : table of known masses to learn from, see `weighbridge.fleet.tickets`
+    tickets : table of known masses; None to learn the scales of the vehicles alone
     """
 
     method: str = "joint"
@@ -72,10 +72,9 @@ class FleetSettings:
             raise ConfigError(
                 f"unknown method {self.method!r}{suggestion(self.method, ESTIMATORS)}"
             )
-        if (self.learn is None) != (self.tickets is None):
+        if self.learn is None and self.tickets is not None:
             raise ConfigError(
-                "learning needs a folder for the refined vehicle files and a table of tickets: "
-                "give both, --learn DIR and --tickets FILE"
+                "--tickets refine vehicle files: name a folder for these, too, --learn DIR"
             )
         if self.settings:
             ESTIMATORS[self.method].settings_of(self.settings)
@@ -115,8 +114,9 @@ def weigh_drives(
     whole : take each recording as one drive
     scheduler : address of a Dask cluster; None for workers of this machine
     workers, memory : number and limit of the workers of this machine
-    learn, tickets : folder for vehicle files refined by the drives of known mass, and the table of
-        these; what was learnt is in ``learnt.parquet`` of the results
+    learn : folder for refined vehicle files; legs are corrected by what the fleet shows of the
+        scale of each vehicle. What was learnt is in ``learnt.parquet`` of the results
+    tickets : table of drives of known mass, which refine vehicle files
     progress : called with recordings done and found
 
     Returns
@@ -179,7 +179,7 @@ def run_fleet(
         try:
             with connected(how.scheduler, how.workers, how.memory) as client:
                 count = run_jobs(client, jobs, teller)
-                if how.learn is not None and how.tickets is not None:
+                if how.learn is not None:
                     teller.settle()
                     shelf = Vehicles(vehicles, how.kind, how.mapping)
                     learn_fleet(
@@ -212,8 +212,9 @@ def prepared(
         As of `weigh_drives`.
     """
     shelf = Vehicles(vehicles, how.kind, how.mapping)
-    if how.learn is not None and how.tickets is not None:
+    if how.learn is not None:
         refuse_output(how.learn, shelf)
+    if how.tickets is not None:
         read_tickets(how.tickets)
     refuse_missing(given)
     found = recordings(given)

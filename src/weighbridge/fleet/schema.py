@@ -11,12 +11,13 @@ from typing import Final, NamedTuple
 
 import polars as pl
 
-FORMAT_VERSION: Final = 4
+FORMAT_VERSION: Final = 5
 """Version of the tables; part of every key, so that another one weighs anew."""
 
-READABLE: Final = (2, 3, FORMAT_VERSION)
-"""Versions that can be read. Before 4, a recording was known by its content alone and ``start`` was
-a text; tables of 2 lack ids of messages."""
+READABLE: Final = (2, 3, 4, FORMAT_VERSION)
+"""Versions that can be read. Before 5, rows lack the digest of the vehicle file. Before 4, a
+recording was known by its content alone and ``start`` was a text; tables of 2 lack ids of
+messages."""
 
 DAY: Final = "day"
 """Name of the partitions: no column of the tables has it, so that no reader finds two types."""
@@ -60,6 +61,7 @@ DRIVES: Final[dict[str, Column]] = {
     "outcome": Column(_TEXT, "weighed, unread (bad data) or failed (three tries; tried again)"),
     "vehicle_id": Column(_TEXT, "id by which its vehicle file was found"),
     "vehicle_file": Column(_TEXT, "name of that file; null where the class's data sheet was used"),
+    "vehicle_digest": Column(_TEXT, "digest of that file and its mapping"),
     "vehicle_class": Column(_TEXT, "car, van, bus, truck, motorcycle …"),
     "tare_kg": Column(_NUMBER, "mass of the empty vehicle, of its file"),
     "gross_kg": Column(_NUMBER, "permitted mass, of its file"),
@@ -147,6 +149,11 @@ LEGS: Final[dict[str, Column]] = {
     "mass_kg": Column(_NUMBER, "mass; null where none is known"),
     "std_kg": Column(_NUMBER, "its standard deviation"),
     "shared_kg": Column(_NUMBER, "part of std_kg that all legs of the vehicle share"),
+    "common_kg": Column(_NUMBER, "part of shared_kg that vehicles of its type or class share"),
+    "weighed_kg": Column(_NUMBER, "mass as of the drive, before the factor"),
+    "weighed_std_kg": Column(_NUMBER, "its standard deviation"),
+    "type": Column(_TEXT, "vehicles of it share common_kg; null if no factor is learnt"),
+    "factor": Column(_NUMBER, "mass_kg over weighed_kg, learnt from the fleet; null if none is"),
     "freedom": DRIVES["freedom"],
     "low95_kg": Column(_NUMBER, "lower end of the 95 % interval"),
     "high95_kg": Column(_NUMBER, "upper end of it"),

@@ -48,6 +48,7 @@ _PER_MPS2: Final = "_per_mps2"
 VEHICLE_KEYS: Final = (
     Key("name", "name", "for people", "text"),
     Key("class", "kind", "such as car, van, bus, truck or motorcycle", "text"),
+    Key("type", "type", "make and model, shared by vehicles that are built alike", "text"),
     Key("engine", "engine", "petrol, diesel or electric", "text"),
     Key("tare", "tare", "mass without payload; the payload is counted from it", suffix="kg"),
     Key("gross", "gross", "permitted mass", suffix="kg"),

@@ -51,6 +51,7 @@ class Vehicle:
     ----------
     name : for people
     kind : name of one of `weighbridge.vehicle.classes.VEHICLE_CLASSES`
+    type : make and model; vehicles of a fleet with the same type share errors of their torque
     engine : "petrol", "diesel" or "electric"; None where it is not known
     tare : mass without payload [kg]
     gross : permitted mass [kg]
@@ -63,6 +64,7 @@ class Vehicle:
 
     name: str = "vehicle"
     kind: str = "car"
+    type: str | None = None
     engine: EngineKind | None = None
     tare: float | None = None
     gross: float | None = None
@@ -81,7 +83,7 @@ class Vehicle:
     def __post_init__(self) -> None:
         check_text("name", self.name)
         check_text("kind", self.kind)
-        for name in ("engine", "mapping"):
+        for name in ("type", "engine", "mapping"):
             check_text(name, getattr(self, name), optional=True)
         for name, (part, optional) in _PARTS.items():
             if not (optional and getattr(self, name) is None):
