@@ -101,6 +101,26 @@ def test_what_was_learnt_is_told_those_to_look_at_first(weighbridge, results, tm
     assert shown["torque_drift_pct"] == [None, None, 2.0]
 
 
+def test_corrections_are_told_and_who_seems_never_empty(weighbridge, results, tmp_path):
+    common = {"drives": 0, "weighed": 0, "type": "truck", "factor_std": 0.015, "factor_legs": 9}
+    rows = [
+        common | {"vehicle_id": "truck1", "factor": 0.951, "factor_reason_id": "fleet.scale_empty",
+                  "factor_reason": "by its empty runs"},
+        common | {"vehicle_id": "truck3", "factor": 1.012, "factor_reason_id": "fleet.scale_wrong",
+                  "factor_reason": "its lightest runs contradict its empty mass"},
+    ]  # fmt: skip
+    write_learnt(results, rows)
+    ran = weighbridge("fleet", "report", results, "--json", tmp_path / "fleet.json")
+    assert ran.code == 0
+    assert "masses of 2 vehicles are corrected" in ran.out
+    assert "by -4.9 to +1.2 %" in ran.out
+    assert "truck3: its lightest runs contradict its empty mass" in ran.out
+    assert "truck1: by its empty runs" not in ran.out
+    assert "tickets of" not in ran.out
+    told = json.loads((tmp_path / "fleet.json").read_text())["learnt"]
+    assert [row["verdict"] for row in told] == ["never empty", "scaled"]
+
+
 def test_a_damaged_file_of_what_was_learnt_is_named(weighbridge, results):
     (results / "learnt.parquet").write_bytes(b"PAR1")
     ran = weighbridge("fleet", "report", results)

@@ -40,7 +40,10 @@ class Fleet:
         self.home, self.true = home, {}
         self.cars.mkdir()
 
-    def add(self, name, true, weighed, *, kind="tipper", tare=TARE, gross=GROSS, backwards=False):
+    def add(
+        self, name, true, weighed, *, kind="tipper", tare=TARE, gross=GROSS, stated=STATED,
+        backwards=False,
+    ):  # fmt: skip
         car = describe(Known(name=name, kind="truck", tare=tare, gross=gross, torque="percent"))
         replace(car.vehicle, type=kind).save(self.cars / f"{name}.toml")
         digest = Vehicles(self.cars).of((), name).digest
@@ -55,7 +58,7 @@ class Fleet:
                 start=start.isoformat(),
                 mass=mass,
                 std=math.hypot(STATED, 0.012) * mass,
-                systematic_std_kg=STATED * mass,
+                systematic_std_kg=None if stated is None else stated * mass,
                 tare_kg=tare,
                 gross_kg=gross,
                 vehicle_digest=digest,
@@ -64,11 +67,12 @@ class Fleet:
             write_part(folder, key, [row | {"segments": []}])
 
     def learn(self, scheduler, **how):
+        """Run the command's function, which learns unless ``learn`` is None."""
         if not self.drives.exists():
             tiny_drive(self.drives / "other" / "trip", 1)
         wb.fleet.weigh_drives(
             self.drives, self.cars, self.results, scheduler=scheduler, kind="truck",
-            learn=self.home / "refined", **how,
+            **{"learn": self.home / "refined"} | how,
         )  # fmt: skip
         return self.told()
 
@@ -97,6 +101,8 @@ def fleet(tmp_path):
 
 
 def test_masses_are_corrected_by_empty_runs_and_by_what_a_type_shares(fleet, scheduler):
+    legs, learnt = fleet.learn(scheduler, learn=None)
+    assert (len(learnt), legs["factor"].null_count()) == (0, legs.height)
     legs, learnt = fleet.learn(scheduler)
     trucks = legs.filter(pl.col("vehicle_id") != "crane")
     assert trucks["raw"].mean() > 0.05
@@ -138,7 +144,17 @@ def test_transport_and_overload_are_those_of_the_corrected_masses(fleet, schedul
     true = sum(1e-3 * (mass - TARE) * 20.0 for mass in fleet.true.values())
     assert before.totals["tkm"] > 1.1 * true
     assert after.totals["tkm"] == pytest.approx(true, rel=0.06)
-    assert after.totals["tkm_std"] < 0.6 * before.totals["tkm_std"]
+    # What a type shares adds up as it is, all else by squares.
+    way = pl.col("distance_km") * 1e-3
+    sums = after.legs.filter(pl.col("tkm").is_not_null()).group_by("vehicle_id").agg(
+        common=(way * pl.col("common_kg")).sum(),
+        shared=(way * pl.col("shared_kg")).sum(),
+        alone=(way**2 * (pl.col("std_kg") ** 2 - pl.col("shared_kg") ** 2)).sum(),
+    )  # fmt: skip
+    rest = (sums["shared"] ** 2 - sums["common"] ** 2 + sums["alone"]).sum()
+    std = math.sqrt(sums["common"].sum() ** 2 + rest)
+    assert after.totals["tkm_std"] == pytest.approx(std, rel=1e-6)
+    assert std < 0.6 * before.totals["tkm_std"]
     heavier = before.legs.join(after.legs, on="key", suffix="_after").drop_nulls("overload")
     assert (heavier["overload"] >= heavier["overload_after"]).mean() > 0.9
     moved = after.speed_mass.filter(pl.col("mass_t") >= 18.0)["distance_km"].sum()
@@ -172,6 +188,17 @@ def test_the_order_of_rows_and_a_run_that_is_continued_change_nothing(fleet, tmp
     assert after.equals(before)
 
 
+def test_known_masses_are_compared_with_what_was_weighed(fleet, tmp_path, scheduler):
+    fleet.learn(scheduler)
+    tickets = tmp_path / "tickets.csv"
+    known, when = fleet.true["truck4-003"], BEGIN + timedelta(hours=9, minutes=5)
+    tickets.write_text(f"vehicle,time,mass_kg\ntruck4,{when.isoformat()},{known:.0f}\n")
+    (row,) = wb.fleet.report(fleet.results, tickets=tickets, tolerance=0.03).verdicts.to_dicts()
+    worst = max(row[name] or 0.0 for name in ("worst_50", "worst_70", "worst_95"))
+    legs, _ = fleet.told()
+    assert worst == pytest.approx(legs.filter(pl.col("key") == "truck4-003")["raw"][0], abs=1e-4)
+
+
 def test_one_ticket_of_another_vehicle_of_the_type_makes_it_better(tmp_path, scheduler):
     fleet = Fleet(tmp_path)
     for k in range(4):
@@ -194,6 +221,8 @@ def test_little_is_learnt_from_little(tmp_path, scheduler):
     fleet.add("no tare", *runs(1, 0.05), kind="b", tare=None)
     fleet.add("no type", *runs(2, 0.05), kind=None)
     fleet.add("lost", [TARE] * 3, [math.nan] * 3, kind="c")
+    fleet.add("unstated", *runs(1, 0.05), kind="e", stated=None)
+    fleet.add("exact", *runs(1, 0.05), kind="f", stated=0.0)
     for k in range(3):
         fleet.add(f"loaded{k}", *runs(k + 3, 0.0, empty=0.0), kind="d")
     legs, learnt = fleet.learn(scheduler)
@@ -202,7 +231,9 @@ def test_little_is_learnt_from_little(tmp_path, scheduler):
     assert learnt["no tare"]["factor_reason_id"] == "fleet.scale_no_tare"
     assert learnt["no type"]["type"] == "truck"
     assert abs(legs.filter(pl.col("vehicle_id") == "no type")["error"].mean()) < 0.02
-    assert "lost" not in learnt
+    assert not {"lost", "unstated"} & set(learnt)
+    exact = learnt.pop("exact")
+    assert (exact["factor"], exact["factor_std"]) == (1.0, 0.0)
     for row in learnt.values():
         assert 0.9 < row["factor"] < 1.1
         assert 0.0 < row["factor_common_std"] <= row["factor_std"] <= STATED * 1.001
@@ -216,6 +247,12 @@ def test_little_is_learnt_from_little(tmp_path, scheduler):
 def test_a_factor_is_of_the_vehicle_file_that_it_was_learnt_of(fleet, scheduler):
     legs, _ = fleet.learn(scheduler)
     assert legs["factor"].null_count() == 0
+    # Weighed again with a file that calibration changed, before anything is learnt of it.
+    fleet.add("truck1", *runs(1, 0.0), kind="calibrated")
+    after, learnt = fleet.told()
+    own = after.filter(pl.col("vehicle_id") == "truck1")
+    assert learnt["truck1"]["factor"] < 0.97
+    assert own["mass_kg"].equals(own["weighed_kg"])
     path = fleet.cars / "truck0.toml"
     path.write_text(path.read_text() + "# calibrated\n")
     # Its rows are those of the old file until its drives are weighed again.

@@ -184,7 +184,7 @@ def learn_scales(
         orient="row",
     )  # fmt: skip
     rows = rows.join(current, on=["vehicle_id", "vehicle_digest"], how="semi")
-    rows = rows.filter(pl.col("mass_kg") > 0.0)
+    rows = rows.filter(pl.col("mass_kg") > 0.0).drop_nulls(["std_kg", "shared_kg"])
     told = [] if tickets is None else read_tickets(tickets)
     known = with_tickets(rows, told).select("key", "part", "leg", "ticket_kg")
     rows = rows.join(known, on=["key", "part", "leg"], how="left")
