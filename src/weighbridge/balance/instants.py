@@ -54,8 +54,12 @@ BAND: Final = 0.8
 """Edge of what the mean of a window of a heavy vehicle keeps [Hz]: in four drives of two trucks a
 sixth of the specific force is above it, and nine tenths of the error of one sample (RMS). With 0.6
 to 1.2 Hz the masses of six trucks scatter alike. Of the corpus it changes 60 undamaged pairs of
-trucks and buses, from 4.20 to 3.84 % RMS. For cars at 1 Hz it is no gain: 1.2 to 1.7 % RMS
-in eight drives of another simulator."""
+trucks and buses, from 4.20 to 3.84 % RMS."""
+
+CHANGES: Final = 0.5
+"""Within so long a car changes its force [s], and the mean of a longer time is another one: at 1 Hz
+eight drives of another simulator went from 1.2 to 1.7 % RMS. Below it, samples of a sensor of 10 Hz
+between those of the torque count, too: 25 such drives of cars and vans went from 3.0 to 2.6 %."""
 
 ENOUGH_ROWS: Final = 16
 """So many rows of a window average a vibration themselves, see
@@ -94,12 +98,13 @@ def lagged_motion(motion: Motion, lag: float, before: Motion | None = None) -> M
 
 
 def in_band(motion: Motion, vehicle: Vehicle, period: float) -> Motion:
-    """Take off the vibration of a heavy vehicle that the mean of a window does not keep.
+    """Take the motion at an instant as a mean over what the torque read there stands for.
 
     A window has few samples of a torque that comes slowly, and a vibration at their instants is
     noise of the motion, which makes every mass too low. The mean of all samples around an instant
-    has less of it, and keeps the starts and hills that weigh. The slope of a smoothed speed is such
-    a mean already. A car changes its force within half a second, which a mean would lose.
+    has less of it, and keeps the starts and hills that weigh. Of a car that is a mean over the
+    period of the torque; a heavy vehicle changes its force more slowly, see `BAND`. The slope of a
+    smoothed speed is such a mean already.
 
     Parameters
     ----------
@@ -112,14 +117,16 @@ def in_band(motion: Motion, vehicle: Vehicle, period: float) -> Motion:
     Oppenheim and Schafer, Discrete-Time Signal Processing, 2010, ch. 7.5.
     """
     heavy = vehicle.of_class.underpowered
-    if motion.source in BY_SPEED or not heavy or period < WINDOW / ENOUGH_ROWS:
+    averaged = WINDOW / ENOUGH_ROWS <= period and (heavy or period <= CHANGES)
+    if motion.source in BY_SPEED or not averaged:
         return motion
     columns = (motion.specific_force, motion.accel, motion.grade)
     values = np.column_stack([np.nan_to_num(column) for column in columns])
     anew = np.concatenate(([False], _silent(motion)))
+    edge, reach = (BAND, REACH) if heavy else (0.5 / period, min(2.0 * period, REACH))
     # A row lies between two of the motion.
-    share, reach = BAND / motion.rate, max(round(REACH * motion.rate) - 1, 0)
-    slow = lowpass_even(values, motion.valid, anew, share, reach)
+    beside = max(round(reach * motion.rate) - 1, 0)
+    slow = lowpass_even(values, motion.valid, anew, edge / motion.rate, beside)
     force, accel, grade = (
         np.where(motion.valid, x, y) for x, y in zip(slow.T, columns, strict=True)
     )
