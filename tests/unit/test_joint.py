@@ -16,6 +16,7 @@ from weighbridge.estimators.joint import batch
 from weighbridge.estimators.joint import forward as joint_forward
 from weighbridge.estimators.joint.slow_errors import DATA_SHEET_NAMES, design, usable_rows
 from weighbridge.estimators.noisy_motion import too_low
+from weighbridge.navigation.select import without_accelerometer
 from weighbridge.simulation import MIDSIZE, Scenario, short_route, simulate_car
 from weighbridge.vehicle.model import Driveline, TorqueModel
 
@@ -240,6 +241,24 @@ def test_a_table_that_is_late_as_a_whole_is_moved_and_told(made, car, balance, l
     assert found.mass == pytest.approx(usual.mass, rel=0.01)
     moved = [p.values["by"] for p in found.problems if p.id == "torque.clock_moved"]
     assert moved == pytest.approx([late], abs=0.1)
+
+
+def clock_moved(drive, vehicle):
+    return [
+        p.values["by"] for p in wb.weigh(drive, vehicle).problems if p.id == "torque.clock_moved"
+    ]
+
+
+@pytest.mark.parametrize(("std", "told"), [(0.01, [0.4]), (0.2, [])])
+def test_a_clock_has_moved_by_more_than_the_calibration_leaves_open(made, car, std, told):
+    known = replace(car, timing=replace(car.timing, torque_delay_std=std))
+    assert clock_moved(late_engine(made, 0.4, ENGINE), known) == pytest.approx(told, abs=0.1)
+
+
+def test_speeds_are_late_themselves_and_move_no_clock(made, car):
+    late = late_engine(made, 0.4, ENGINE)
+    assert clock_moved(late, car)
+    assert not clock_moved(without_accelerometer(late), car)
 
 
 def forward(track, stops=1.0):

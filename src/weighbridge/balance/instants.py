@@ -117,7 +117,7 @@ def in_band(motion: Motion, vehicle: Vehicle, period: float) -> Motion:
     Oppenheim and Schafer, Discrete-Time Signal Processing, 2010, ch. 7.5.
     """
     heavy = vehicle.of_class.underpowered
-    averaged = WINDOW / ENOUGH_ROWS <= period and (heavy or period <= CHANGES)
+    averaged = period >= WINDOW / ENOUGH_ROWS and (heavy or period <= CHANGES)
     if motion.source in BY_SPEED or not averaged:
         return motion
     columns = (motion.specific_force, motion.accel, motion.grade)

@@ -34,6 +34,7 @@ from weighbridge.estimators.joint.changing import largest
 from weighbridge.estimators.joint.contradicted import contradicted
 from weighbridge.estimators.joint.foreign import of_another
 from weighbridge.estimators.joint.slow_errors import motion_variance, with_variance
+from weighbridge.estimators.judging import lacks_accelerometer
 from weighbridge.estimators.settings import differences
 from weighbridge.estimators.squat import of_vehicle
 from weighbridge.messages import Problem, phrase, refused
@@ -489,7 +490,9 @@ def torque_balance(drive: Drive, vehicle: Vehicle) -> tuple[ForceBalance, tuple[
         later = _other_clock(drive, vehicle, motion, balance)
         if later:
             delay += later
-            notes += (Problem.of("torque.clock_moved", later=_later(later), by=later),)
+            # Against a speed alone, which is late itself, the torque's clock is another one.
+            if not lacks_accelerometer(vehicle, motion):
+                notes += (Problem.of("torque.clock_moved", later=_later(later), by=later),)
     if balance.delay != delay:
         balance = force_balance(drive, vehicle, motion, delay=delay)
     balance = replace(balance, navigation=navigation)
