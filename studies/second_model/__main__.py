@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 
 from .driver import STYLES
+from .gearboxes import VARIANTS, random_variant
 from .make import TRUTH_RATE, make_drive
 from .sensing import Logger
 from .vehicle import KINDS, random_vehicle
@@ -12,7 +13,7 @@ from .vehicle import KINDS, random_vehicle
 def main(arguments: list[str] | None = None) -> None:
     parser = argparse.ArgumentParser(prog="second_model", description=__doc__)
     parser.add_argument("folder", type=Path)
-    parser.add_argument("--kind", choices=KINDS, default="petrol")
+    parser.add_argument("--kind", choices=(*KINDS, *VARIANTS), default="petrol")
     parser.add_argument("--vehicle-seed", type=int, default=1)
     parser.add_argument(
         "--mass", type=float, help="kg; tare and a third of the payload if not given"
@@ -38,7 +39,8 @@ def main(arguments: list[str] | None = None) -> None:
     ):
         parser.add_argument(f"--{name}", action="store_true")
     args = parser.parse_args(arguments)
-    vehicle = random_vehicle(args.kind, args.vehicle_seed)
+    draw = random_variant if args.kind in VARIANTS else random_vehicle
+    vehicle = draw(args.kind, args.vehicle_seed)
     mass = args.mass or vehicle.tare + (vehicle.gross - vehicle.tare) / 3.0
     logger = Logger(
         mode="rows" if args.rows else "polled",

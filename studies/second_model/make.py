@@ -7,6 +7,7 @@ import numpy as np
 import polars as pl
 
 from .driver import STYLES, random_driver
+from .gearboxes import hybridised
 from .motion import DT, RATE, Day, Driver, Road, run
 from .road import Surroundings, make_road
 from .sensing import AT, Logger, gnss, imu, obd
@@ -176,8 +177,12 @@ def make_drive(
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     rng = np.random.default_rng([seed, 40])
+    battery = None
+    if vehicle.hybrid is not None:
+        shared, battery = hybridised(m.out, vehicle, np.random.default_rng([seed, 60]))
+        m = m._replace(out=shared)
     _write(folder / "imu.parquet", imu(m.out, vehicle, logger, rng))
-    _write(folder / "obd.parquet", obd(m.out, vehicle, logger, m.air, rng))
+    _write(folder / "obd.parquet", obd(m.out, vehicle, logger, m.air, rng, battery))
     if logger.gnss:
         around = gnss(m.out, m.around, m.road.step, logger, m.height, rng)
         _write(folder / "gnss.parquet", around)

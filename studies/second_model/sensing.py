@@ -210,7 +210,12 @@ def _believed(out: np.ndarray, ecu: Ecu, vehicle: Vehicle) -> np.ndarray:
 
 
 def _ecu_values(
-    out: np.ndarray, vehicle: Vehicle, logger: Logger, air: float, rng
+    out: np.ndarray,
+    vehicle: Vehicle,
+    logger: Logger,
+    air: float,
+    rng,
+    battery: np.ndarray | None,
 ) -> dict[str, np.ndarray]:
     """Values on the control units' side, before polling, on the motion's clock."""
     ecu, engine = vehicle.ecu, vehicle.engine
@@ -297,12 +302,26 @@ def _ecu_values(
         ) / (2.0 * ecu.resistance)
         values["battery_voltage_v"] = np.round((open_v - ecu.resistance * current) * 4.0) / 4.0
         values["battery_current_a"] = np.round(current * 10.0) / 10.0
+    if logger.battery and battery is not None and vehicle.hybrid is not None:
+        volts = vehicle.hybrid.voltage * (1.0 - 0.08 * battery / vehicle.hybrid.motor_power)
+        values["battery_voltage_v"] = np.round(volts * 4.0) / 4.0
+        values["battery_current_a"] = np.round(battery / volts * 10.0) / 10.0
     return values
 
 
-def obd(out: np.ndarray, vehicle: Vehicle, logger: Logger, air: float, rng) -> Columns:
-    """Values as the logger has them: polled in turn, or row by row."""
-    values = _ecu_values(out, vehicle, logger, air, rng)
+def obd(
+    out: np.ndarray,
+    vehicle: Vehicle,
+    logger: Logger,
+    air: float,
+    rng,
+    battery: np.ndarray | None = None,
+) -> Columns:
+    """Values as the logger has them: polled in turn, or row by row.
+
+    ``battery`` is what that of a hybrid gives (n,) [W].
+    """
+    values = _ecu_values(out, vehicle, logger, air, rng, battery)
     n = out.shape[0]
     length = n / RATE
     u = rng.uniform

@@ -68,6 +68,41 @@ class Ecu:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Hybrid:
+    """A motor beside the engine, see ``gearboxes``.
+
+    Attributes
+    ----------
+    layout : "power_split", "parallel_hybrid" or "mild_hybrid"
+    engine_power, motor_power, motor_torque : most that they give [W, W, N m]
+    start_power, fastest_alone : the engine runs above this power or speed [W, m/s]
+    capacity, voltage : of the battery [J, V]
+    efficiency, mechanical : of motor with battery, of what lies before the wheels [-]
+    charging : part of the motor's power for all of the charge that is missing [-]
+    best_torque : of the engine, over its highest; the motor gives what is above it [-]
+    slow, fast, bend, lag : engine speeds of a power split at no and at full power [rad/s], with
+        which power of the power it rises, how late [s]
+    """
+
+    layout: str
+    engine_power: float
+    motor_power: float
+    motor_torque: float
+    start_power: float
+    fastest_alone: float
+    capacity: float
+    voltage: float
+    efficiency: float
+    mechanical: float
+    charging: float
+    best_torque: float
+    slow: float
+    fast: float
+    bend: float
+    lag: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Vehicle:
     """One vehicle.
 
@@ -79,6 +114,7 @@ class Vehicle:
     ecu : what it sends
     top_speed : by law or governor [m/s]
     cylinders : number, for the engine's vibration; 0 for a motor
+    hybrid : motor beside the engine; None without
     """
 
     name: str
@@ -91,6 +127,7 @@ class Vehicle:
     ecu: Ecu
     top_speed: float
     cylinders: int
+    hybrid: Hybrid | None = None
 
 
 def _curve(kind: str, peak: float, power: float, limit: float, rng) -> tuple[np.ndarray, float]:

@@ -14,7 +14,8 @@ from weighbridge import read_drive
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "studies"))
 
-from second_model import Logger, make_drive, random_vehicle, simulate
+from second_model import VARIANTS, Logger, make_drive, random_variant, random_vehicle, simulate
+from second_model.gearboxes import hybridised
 from second_model.motion import RATE, G
 from second_model.sensing import AT, imu
 from second_model.vehicle import KINDS as EVERY_KIND
@@ -175,6 +176,54 @@ def test_high_gears_lose_little_power(kind):
         assert top < 1.0
         high += 1
     assert high > 0
+
+
+@pytest.mark.parametrize("variant", ["power_split", "parallel_hybrid", "mild_hybrid"])
+def test_engine_and_battery_of_a_hybrid_give_what_moves_it(variant):
+    vehicle = random_variant(variant, 7)
+    m = simulate(vehicle, mass=vehicle.tare + 200.0, seed=5, duration=900.0)
+    out, battery = hybridised(m.out, vehicle, np.random.default_rng(1))
+    h, at = vehicle.hybrid, {name: out[:, k] for name, k in AT.items()}
+    before = {name: m.out[:, k] for name, k in AT.items()}
+    if variant == "power_split":
+        power = before["traction_force"] * before["speed"] / h.mechanical
+        inertia = vehicle.engine.inertia * np.gradient(at["engine_speed"]) * RATE
+        by_engine = (at["engine_torque"] - inertia) * at["engine_speed"]
+    else:
+        power = before["engine_torque"] * before["engine_speed"]
+        by_engine = at["engine_torque"] * at["engine_speed"]
+    saved = (before["brake_force"] - at["brake_force"]) * before["speed"]
+    electric = battery - at["accessory_power"] + h.efficiency * saved
+    electric = np.where(electric > 0.0, electric * h.efficiency, electric / h.efficiency)
+    whole = np.convolve(by_engine + electric - power, np.full(500, 1.0 / 500.0), "valid")
+    assert np.quantile(np.abs(whole), 0.95) < 0.03 * np.quantile(np.abs(power), 0.99)
+    assert np.all(at["speed"] == before["speed"])
+    # Neither is idle all along.
+    assert np.quantile(np.abs(electric), 0.9) > 1500.0
+    assert np.quantile(by_engine, 0.95) > 5000.0
+    assert np.mean(at["engine_speed"][at["speed"] > 1.0] < 20.0) < 0.7
+
+
+def test_a_worn_clutch_slips_where_it_pulls():
+    worn, new = random_variant("slipping_clutch", 4603), random_vehicle("petrol", 4603)
+    assert worn.box.capacity < new.engine.full.max()
+    share = []
+    for vehicle in (worn, new):
+        out = simulate(vehicle, mass=vehicle.tare + 200.0, seed=5, duration=900.0).out
+        pulls = (out[:, AT["pedal"]] > 0.7) & (out[:, AT["speed"]] > 8.0)
+        share.append(np.mean(out[pulls, AT["clutch_open"]]))
+    assert share[0] > share[1] + 0.1
+
+
+def test_two_speeds_shift_and_hub_motors_turn_as_the_wheels():
+    assert set(VARIANTS) >= {"two_speed_electric", "hub_motors"}
+    out = simulate(random_variant("two_speed_electric", 7), mass=1900.0, seed=5).out
+    assert set(np.unique(out[:, AT["gear"]])) >= {1.0, 2.0}
+    hub = random_variant("hub_motors", 7)
+    out = simulate(hub, mass=1900.0, seed=5).out
+    fast = out[:, AT["speed"]] > 10.0
+    ratio = out[fast, AT["engine_speed"]] / out[fast, AT["speed"]]
+    assert np.median(ratio) == pytest.approx(1.0 / hub.body.radius, rel=0.03)
 
 
 def test_city_traffic_looks_like_city_traffic():
