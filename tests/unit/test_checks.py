@@ -335,6 +335,12 @@ def test_engine_speed_in_radians(sane):
     assert problem.id == "engine.speed_radians"
 
 
+def test_a_motor_in_the_hub_turns_slowly(sane):
+    speed = sane.signals["vehicle_speed"]
+    hub = Signal("engine_speed", speed.time, speed.values / 0.33)
+    assert "engine.speed_radians" not in {p.id for p in serious(sane.with_signals(hub))}
+
+
 def test_time_in_milliseconds(sane):
     late = {n: replace(s, time=s.time * 1e3) for n, s in sane.signals.items()}
     problem = only(replace(sane, signals=late))

@@ -123,6 +123,21 @@ def test_a_stepless_gearbox_is_told_from_gears():
     assert stepless_range(*drive(np.random.default_rng(4)), idle_speed=80.0) is None
 
 
+def test_a_stepless_gearbox_that_rests_at_its_last_ratio_is_no_gear():
+    time = np.arange(8000) * 0.25
+    speed = np.where(time < 1200.0, 25.0 + np.sin(time / 20.0), 15.0 + 8.0 * np.sin(time / 20.0))
+    engine = np.clip(190.0 + 60.0 * np.sin(time / 13.0), 12.0 * speed, 40.0 * speed)
+    assert np.mean(engine < 12.01 * speed) > 0.6
+    low, _ = stepless_range(time, engine, speed, idle_speed=80.0)
+    assert low == pytest.approx(12.0, rel=0.01)
+
+
+def test_a_motor_in_the_hub_is_a_gear():
+    time, _, speed = drive(np.random.default_rng(5))
+    found = detect_gearings(time, speed / 0.345, speed, idle_speed=0.0)
+    assert found.gearings == pytest.approx([1.0 / 0.345], rel=0.005)
+
+
 def test_too_short_a_drive_says_so():
     time = np.arange(20) * 0.25
     with refused("gear.few_samples"):

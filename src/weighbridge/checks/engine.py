@@ -13,7 +13,7 @@ from weighbridge.messages import phrase
 from weighbridge.signals import Drive, Problem, Signal
 from weighbridge.signals.correlation import correlation
 from weighbridge.vehicle.data_sheet import FRICTION_PRESSURE, friction_coefficients
-from weighbridge.vehicle.gear import idling
+from weighbridge.vehicle.gear import LOWEST_GEARING, idling
 from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.torque import source_of
 
@@ -157,9 +157,10 @@ def check_engine_speed(drive: Drive, vehicle: Vehicle | None) -> Iterator[Proble
     fast = speed.at(engine.time) > 10.0
     if np.count_nonzero(fast) < 20:
         return
-    # Slower than any idle, but turning: rad/s or revolutions per second.
+    # Slower than any idle, and than the wheels, but turning: rad/s or revolutions per second.
     highest = float(np.max(engine.values[fast]))
-    if 1.0 < highest < 62.0:
+    ratio = float(np.median(engine.values[fast] / speed.at(engine.time)[fast]))
+    if 1.0 < highest < 62.0 and ratio < LOWEST_GEARING:
         yield Problem.of(
             "engine.speed_radians",
             "engine_speed",
