@@ -64,7 +64,7 @@ def motor_helps(drive: Drive, balance: ForceBalance, vehicle: Vehicle) -> Proble
     lasted = lasted[lasted >= SHORTEST]
     if lasted.size >= FEWEST:
         return Problem.of("hybrid.engine_stands", times=lasted.size, lasted=float(lasted.sum()))
-    share = _battery_share(drive, vehicle)
+    share = _battery_share(drive) if _engine_beside(balance, vehicle) else 0.0
     if share > OFTEN:
         return Problem.of("hybrid.battery", "battery_current", share=100.0 * share)
     return None
@@ -80,14 +80,19 @@ def _engine_stands(balance: ForceBalance) -> Bools:
     return np.asarray(stands & pulled & (table.speed > ROLLS))
 
 
-def _battery_share(drive: Drive, vehicle: Vehicle) -> float:
-    """Part of the driving in which a battery of traction gives or takes a motor's power [-].
+def _engine_beside(balance: ForceBalance, vehicle: Vehicle) -> bool:
+    """Whether the torque is that of an engine: it idles, or stands while the vehicle rolls.
 
-    A motor without an engine that idles beside it is what the torque is read of.
+    Else it is that of the motor, which turns with the wheels.
     """
-    if not vehicle.driveline.idle_speed > 0.0 or not drive.has(
-        "battery_voltage", "battery_current"
-    ):
+    rolls = balance.table.speed > ROLLS
+    stands = np.nan_to_num(balance.table.engine_speed, nan=np.inf)[rolls] < STANDS
+    return vehicle.driveline.idle_speed > 0.0 or bool(np.sum(stands) > OFTEN * stands.size)
+
+
+def _battery_share(drive: Drive) -> float:
+    """Part of the driving in which a battery of traction gives or takes a motor's power [-]."""
+    if not drive.has("battery_voltage", "battery_current"):
         return 0.0
     volts, amps, speed = (
         drive.signals["battery_voltage"],
