@@ -11,6 +11,7 @@ from weighbridge import Vehicle
 from weighbridge.balance import force_balance
 from weighbridge.calibration.run import run_calibration
 from weighbridge.navigation.select import find_motion
+from weighbridge.pipeline.forward import forward_weigh, identify_forward
 from weighbridge.simulation import Sensors, make_scenario, simulate_car
 from weighbridge.vehicle.gear import UNSLIPPED
 from weighbridge.vehicle.model import Driveline
@@ -82,6 +83,29 @@ def test_ratio_and_rate_of_its_engine_are_those_of_the_simulation(known):
     assert np.corrcoef((table.gearing * table.accel)[use], rate[use])[0, 1] < 0.6
 
 
+def test_a_live_scale_has_the_mass_of_the_whole_drive(calibrated):
+    made = drive(180.0, 3, "cvt")
+    weighed = wb.weigh(made.drive, calibrated)
+    setup = identify_forward(weighed)
+    whole = forward_weigh(weighed.drive, setup)
+    assert whole.mass[-1] == pytest.approx(weighed.mass, rel=0.01)
+    assert whole.std[-1] == pytest.approx(weighed.std, rel=0.25)
+
+
+def test_a_ratio_that_comes_later_than_the_torque_is_found(calibrated):
+    late = 0.15
+    made = drive(180.0, 3, "cvt")
+    engine = made.drive.signals["engine_speed"]
+    moved = made.drive.with_signals(replace(engine, time=engine.time + late))
+    found = [
+        wb.weigh(one, calibrated).result.slow_errors.constants["ratio_lateness"]
+        for one in (made.drive, moved)
+    ]
+    (before, _), (after, std) = found
+    assert after - before == pytest.approx(late, abs=2.5 * std)
+    assert after - before > 0.5 * late
+
+
 def test_ratios_beyond_those_of_the_calibration_are_another_vehicles(calibrated):
     line = replace(calibrated.driveline, gearing_range=(20.0, 60.0))
     weighed = wb.weigh(drive(180.0, 3, "cvt").drive, replace(calibrated, driveline=line))
@@ -123,6 +147,18 @@ def test_a_battery_that_drives_beside_the_engine_shows_a_hybrid(known, calibrate
     assert weighed.reason_id == "hybrid.battery"
     small = [battery[0], wb.Signal("battery_current", battery[1].time, 0.05 * battery[1].values)]
     assert wb.weigh(made.drive.with_signals(*small), calibrated).reason_id is None
+
+
+def test_so_does_one_whose_engine_never_idles(known, calibrated):
+    """It stands wherever the car creeps, so that no idle speed is known."""
+    made, truth = known[0], known[0].truth
+    _, battery = with_motor(made)
+    engine = made.drive.signals["engine_speed"]
+    slow = np.interp(engine.time, truth.time, truth.speed) < 8.0
+    stands = replace(engine, values=np.where(slow, 0.0, engine.values))
+    never = replace(calibrated, driveline=replace(calibrated.driveline, idle_speed=0.0))
+    weighed = wb.weigh(made.drive.with_signals(stands, *battery), never)
+    assert weighed.reason_id == "hybrid.battery"
 
 
 def test_of_a_hybrid_the_torque_of_the_engine_is_a_part(known, calibrated):

@@ -23,6 +23,7 @@ from weighbridge.simulation import (
     TRUCK18,
     Scenario,
     Sensors,
+    make_scenario,
     short_route,
     simulate_car,
 )
@@ -204,6 +205,27 @@ def paused(drive):
     )
 
 
+def stepless(_, __):
+    """A car whose ratio moves: engine and vehicle speed are read at instants of their own."""
+    known, driven = (
+        simulate_car(
+            replace(
+                make_scenario(name, payload=load, seed=42_004),
+                sensors=Sensors(imu_rate=50.0),
+                duration=700.0,
+            )
+        )
+        for name, load in (("cvt-calibration", 0.0), ("cvt", 180.0))
+    )
+    weighed = wb.weigh(driven.drive, wb.calibrate(known.drive, mass=known.scenario.mass))
+    assert weighed.vehicle.driveline.stepless
+    return weighed
+
+
+def columns_of(table):
+    return (*COLUMNS, *(("ratio_rate",) if table.ratio_rate is not None else ()))
+
+
 def rows_by_steps(drive, setup):
     """All rows of a drive, as the stages find them step by step; and the whole motion."""
     motion, force = navigation.begin(setup.navigation, drive.start), rows.begin()
@@ -220,8 +242,8 @@ def rows_by_steps(drive, setup):
             force, records, motion.motion, until, setup.vehicle, setup.delay, setup.force
         )
         if new.stop > new.start:
-            parts.append({name: getattr(table, name)[new] for name in COLUMNS})
-    stepped = {name: np.concatenate([part[name] for part in parts]) for name in COLUMNS}
+            parts.append({name: getattr(table, name)[new] for name in columns_of(table)})
+    stepped = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
     return stepped, navigation.joined(moved)
 
 
@@ -231,8 +253,9 @@ def rows_by_steps(drive, setup):
         (None, {Reason.SHIFTING, Reason.OVERRUN}),
         (switched, {Reason.SHIFTING, Reason.BRAKING, Reason.NO_TORQUE}),
         (slow, {Reason.NO_MOTION, Reason.OVERRUN}),
+        (stepless, {Reason.CLUTCH_SLIPPING}),
     ],
-    ids=["load", "switched", "slow"],
+    ids=["load", "switched", "slow", "stepless"],
 )
 def test_rows_of_a_whole_drive_are_those_of_the_stages(weighing, loaded, kind, reasons):
     """Given the setup, nothing but what came before a row and soon after it changes it."""
@@ -243,7 +266,7 @@ def test_rows_of_a_whole_drive_are_those_of_the_stages(weighing, loaded, kind, r
     table = force_balance(drive, setup.vehicle, motion, delay=setup.delay, setup=setup.force).table
     count = stepped["time"].size
     assert 0 <= table.time.size - count <= 3.0 / setup.period
-    for name in COLUMNS:
+    for name in columns_of(table):
         assert_array_equal(getattr(table, name)[:count], stepped[name], err_msg=name)
     told = set(np.unique(table.reason).tolist())
     assert {Reason.USED, Reason.STANDING} | reasons < told

@@ -57,11 +57,7 @@ def step(
         return state, None, slice(0, 0)
     table, state = balance.table, state._replace(lagged=balance.lagged)
     late = max(delay, setup.engine_delay)
-    known = float(motion.time[-1]) - setup.ahead
-    if vehicle.driveline.stepless:
-        # The ratio of a row needs a later motion.
-        known -= late - setup.engine_delay
-    horizon = min(known, until - late - setup.readings_ahead)
+    horizon = min(float(motion.time[-1]) - setup.ahead, until - late - setup.readings_ahead)
     first, last = map(int, table.time.searchsorted([state.time, horizon], side="right"))
     if last <= first:
         return state, table, slice(0, 0)

@@ -11,6 +11,7 @@ from typing import Any, Final
 import numpy as np
 
 from weighbridge.balance.averaging import WINDOW
+from weighbridge.constants import GRAVITY
 from weighbridge.kernels.first_order import even_lag
 from weighbridge.kernels.interpolation import mixed, shares
 from weighbridge.kernels.lowpass import lowpass_even
@@ -36,7 +37,12 @@ BEYOND_RANGE: Final = 1.03
 """A gearing beyond those of a stepless gearbox by this factor is a slip, or an engine that is not
 coupled [-]."""
 
-RATE_SPAN: Final = 0.4
+TYRE_SLIP: Final = 0.08
+"""Slip of the driven wheels over the specific force, in g [-]: traction over load is 15 to 30 times
+the slip, and half of the load is on driven wheels (Gillespie, Fundamentals of Vehicle Dynamics,
+1992, ch. 10)."""
+
+RATE_SPAN: Final = 0.2
 """The rate of an engine speed is looked at over so long before and after [s]."""
 
 SHIFT_MARGIN: Final = 0.4
@@ -346,13 +352,14 @@ def read_instants(
         engine_delay = identify_engine_delay(drive, vehicle, motion)
     # A ratio that moves is that of the instant at which the torque was read: both make power.
     stepless = vehicle.driveline.stepless
-    read_at, rolling = time + engine_delay, speed
-    if stepless:
-        read_at, rolling = recorded, interpolate_motion(motion, recorded - engine_delay)["speed"]
+    read_at = recorded if stepless else time + engine_delay
     engine_speed = engine_speed_at(drive, vehicle, read_at, speed)
     if numbers is None:
         numbers = identify_reported_gears(drive, vehicle, recorded, engine_speed, speed)
-    gear, gearing, slipping = gears_at(drive, vehicle, recorded, engine_speed, rolling, numbers)
+    gear, gearing, slipping = gears_at(drive, vehicle, recorded, engine_speed, speed, numbers)
+    if stepless:
+        # Wheels that pull turn faster than they roll, which is no gearing.
+        gearing = gearing / (1.0 + TYRE_SLIP * np.maximum(rows["specific_force"], 0.0) / GRAVITY)
     changing = shifting(time, gear, margin=SHIFT_MARGIN, ahead=ahead)
     if vehicle.driveline.single_speed:
         changing[:] = False

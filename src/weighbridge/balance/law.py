@@ -31,6 +31,7 @@ from typing import Final
 
 import numpy as np
 
+from weighbridge.balance.instants import SLOWEST_GEARED
 from weighbridge.balance.table import ForceTable
 from weighbridge.constants import (
     GAS_CONSTANT_DRY_AIR,
@@ -58,6 +59,10 @@ WARM_UP: Final = 500.0
 
 SLOWEST_ENGINE: Final = 50.0
 """Of an engine that drives accessories [rad/s]."""
+
+LATENESS_STD: Final = 0.08
+"""Of the engine speed against the torque, from drive to drive [s]: two values of one bus, polled in
+turn, each late by 0.02 to 0.3 s."""
 
 ROAD_PARAMETERS: Final = ("drag_area", "rolling_coefficient", "engine_inertia", "wheel_inertia")
 """Parameters of `road_columns`, in order."""
@@ -177,6 +182,18 @@ def torque_growth_column(table: ForceTable) -> Floats:
     """
     gearing = np.nan_to_num(table.gearing)
     return np.asarray(gearing * (gearing * table.speed / USUAL_SPEED))
+
+
+def lateness_column(table: ForceTable, traction: Floats) -> Floats:
+    """Of the lateness of engine speed against torque, ``-F N' / N`` (n,) [N/s].
+
+    Parameters
+    ----------
+    table : of a stepless gearbox, whose gearing is engine over vehicle speed
+    traction : (n,) [N]
+    """
+    moving = np.maximum(np.nan_to_num(table.speed), SLOWEST_GEARED)
+    return np.asarray(-traction * np.nan_to_num(table.engine_accel) / moving)
 
 
 def accessory_column(table: ForceTable, vehicle: Vehicle) -> Floats:

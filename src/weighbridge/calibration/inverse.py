@@ -121,7 +121,7 @@ class FitSettings:
     wheel_radius : [m]
     prior : mean and standard deviation (4,) of C_d A, C_r, I_e, I_w
     cold_torque_std : of what the cold takes of the torque, over the highest torque [-]
-    usual_gearing : of `weighbridge.vehicle.driveline.Driveline` [1/m]
+    usual_gearing, stepless : of `weighbridge.vehicle.driveline.Driveline` [1/m]
     lasting_drag : learn the drag area from the lasting part of the pressure alone; what comes and
         goes within `AROUND` is taken with that of the class
     window : length of the windows [s]
@@ -138,6 +138,7 @@ class FitSettings:
     prior: tuple[Floats, Floats]
     cold_torque_std: float
     usual_gearing: float = 0.0
+    stepless: bool = False
     lasting_drag: bool = False
     window: float = WINDOW
     rounds: int = 3
@@ -378,6 +379,8 @@ def _columns(d: DriveRows, reading: Floats, centre: Floats, settings: FitSetting
         east,
         law.cold_torque_column(table),
     ]
+    if table.ratio_rate is not None:
+        columns.append(law.lateness_column(table, table.gearing * reading))
     return np.asarray(np.nan_to_num(np.column_stack(columns)))
 
 
@@ -469,12 +472,15 @@ def _solve(
             WIND_STD * mean[0],
             WIND_STD * mean[0],
             settings.cold_torque_std * torque,
+            *([scale * law.LATENESS_STD] if settings.stepless else ()),
         ]
     )
+    # What is constant over a drive is another in the next.
+    fades = (*TIME_CONSTANTS, *([TIME_CONSTANTS[-1]] if settings.stepless else ()))
     x0 = np.concatenate(([1.0], mean, np.zeros(extra), np.zeros(fading.size)))
     prior = block_diag(np.diag(np.square([0.5, *std])), terms, np.diag(np.square(fading)))
     params = kernel.DisturbanceParams(
-        time_constant=np.concatenate((np.full(5 + extra, np.inf), TIME_CONSTANTS)),
+        time_constant=np.concatenate((np.full(5 + extra, np.inf), fades)),
         std=np.concatenate((np.zeros(5 + extra), fading)),
         gate=JointSettings().gate,
         settle_rows=100,

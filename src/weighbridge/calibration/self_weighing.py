@@ -49,10 +49,10 @@ FREEDOM: Final = 6.0
 it: the likeliest are 6.8, of 521 masses of 32 vehicles of two simulators through four kinds of
 equipment."""
 
-STEPLESS_STD: Final = 0.035
+STEPLESS_STD: Final = 0.010
 """How far masses of one vehicle with a stepless gearbox scatter from drive to drive by the losses
-of belt and pump, relative [-]: eight drives of two vehicles of the second model, on other
-roads than those of the calibration, scattered by 4.5 % where all else leaves 2 %."""
+of belt and pump, relative [-]: 29 drives of ten vehicles of two simulators on roads of their own
+have half the squared error that is reported with it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -176,6 +176,7 @@ CONSTANTS: Final = {
     "torque_growth": ("the same, grown with engine speed, at 200 rad/s", "N m"),
     "engine_inertia": ("engine inertia above the file's", "kg m²"),
     "wheel_inertia": ("wheel inertia above the file's", "kg m²"),
+    "ratio_lateness": ("lateness of the engine speed against the torque", "s"),
 }
 """What the states that last as long as the drive are, and their units."""
 

@@ -380,7 +380,12 @@ def _track(
         reason=reason,
         segments=_segments(table, time, solved.begins, smoothed, factor * stds, systematic),
         slow_errors=SlowErrors.from_states(
-            time, solved.x, solved.var, solved.running_var, problem.rows[:, 1]
+            time,
+            solved.x,
+            solved.var,
+            solved.running_var,
+            problem.rows[:, 1],
+            stepless=vehicle.driveline.stepless,
         ),
         filter_input=given,
         possible_change=possible,

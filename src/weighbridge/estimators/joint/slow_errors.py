@@ -65,6 +65,10 @@ where there are several gears: with one they are like the scale and the lean of 
 accelerometer, which would be taken for them (`weighbridge.estimators.joint.confounded`)."""
 
 
+RATIO_LATENESS: Final = "ratio_lateness"
+"""Further state, constant, of a stepless gearbox: how late its ratio is against the torque."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SlowErrors:
     """What stood beside the mass, smoothed over the whole drive, one row per window.
@@ -83,7 +87,8 @@ class SlowErrors:
         deviation: ``cold_torque``, friction of the start in the reading [N m]; ``drag_area``, C_d A
         above that of the vehicle file [m^2]; and those of `DATA_SHEET_NAMES`: by how much the
         file's model of the torque gives too much [N m], the part of it that grows with engine
-        speed, at `USUAL_SPEED` [N m], and inertias above those of the file [kg m^2]
+        speed, at `USUAL_SPEED` [N m], and inertias above those of the file [kg m^2]; and
+        `RATIO_LATENESS` [s]
     """
 
     time: Floats
@@ -99,7 +104,14 @@ class SlowErrors:
 
     @classmethod
     def from_states(
-        cls, time: Floats, x: Floats, var: Floats, mass_var: Floats, gusts: Floats
+        cls,
+        time: Floats,
+        x: Floats,
+        var: Floats,
+        mass_var: Floats,
+        gusts: Floats,
+        *,
+        stepless: bool = False,
     ) -> SlowErrors:
         """Name the states of the filter.
 
@@ -110,7 +122,9 @@ class SlowErrors:
         mass_var : (m,) variance of the mass as known at each window [kg^2]
         gusts : (m,) `weighbridge.balance.law.gust_column` of each window, by which the disturbance
             is a force
+        stepless : whether the last state is `RATIO_LATENESS`
         """
+        names = (*NAMES, *DATA_SHEET_NAMES)[: x.shape[1] - stepless]
         return cls(
             time=time,
             mass_bound=np.sqrt(mass_var),
@@ -123,7 +137,7 @@ class SlowErrors:
             wind_std=np.sqrt(var[:, 3:5]),
             constants={
                 name: (float(x[-1, k]), float(np.sqrt(var[-1, k])))
-                for k, name in enumerate((*NAMES, *DATA_SHEET_NAMES)[: x.shape[1]])
+                for k, name in enumerate((*names, *([RATIO_LATENESS] if stepless else ())))
                 if k >= LASTING
             },
         )
@@ -148,8 +162,8 @@ def design(
 
     Returns
     -------
-    rows : (n, 7) for `NAMES`, or (n, 9) or (n, 11) with `DATA_SHEET_NAMES`; the mass is that of the
-        first row
+    rows : (n, 7) for `NAMES`, or (n, 9) or (n, 11) with `DATA_SHEET_NAMES`, and one more for
+        `RATIO_LATENESS`; the mass is that of the first row
     y : (n,) traction less drag and rotating inertia, and what the fuel that is burnt by then
         would have weighed [N]
     """
@@ -175,6 +189,8 @@ def design(
                 law.engine_inertia_column(np.nan_to_num(table.gearing), table.engine_accel),
                 law.wheel_inertia_column(table.accel, line.wheel_radius),
             ]
+    if vehicle.driveline.stepless:
+        columns.append(law.lateness_column(table, np.nan_to_num(table.traction_force)))
     return np.column_stack(columns), y + phi * table.fuel_burnt
 
 
@@ -239,7 +255,7 @@ def with_variance(motion: Motion, variance: float) -> Motion:
 def prior_std(
     vehicle: Vehicle, mass: float, torque: float, *, unmeasured_grade: float = 0.0
 ) -> Floats:
-    """Standard deviations (7,), (9,) or (11,) of the states before the drive has shown.
+    """Standard deviations (k,) of the states of `design` before the drive has shown.
 
     Parameters
     ----------
@@ -264,6 +280,8 @@ def prior_std(
         states += offset_std(vehicle, torque)
         if not vehicle.driveline.single_speed:
             states += [road.engine_inertia.std, road.wheel_inertia.std]
+    if vehicle.driveline.stepless:
+        states.append(law.LATENESS_STD)
     return np.array(states)
 
 
