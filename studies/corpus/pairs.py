@@ -14,7 +14,7 @@ import fault_subjects
 import numpy as np
 from fault_cases import Case, all_cases, injected, through_files, vehicle_of
 from fault_cases import pairs as pairs_of_faults
-from studies.corpus.subjects import MADE, READ, SHARED, Subject, absent, subject
+from studies.corpus.subjects import MADE, MADE_BY_GEARBOX, READ, SHARED, Subject, absent, subject
 
 import weighbridge as wb
 from weighbridge.signals import Drive, Signal
@@ -572,11 +572,25 @@ def _other_rates() -> Iterator[Pair]:
             )  # fmt: skip
 
 
+def _gearboxes() -> Iterator[Pair]:
+    """Vehicles by their gearbox; a hybrid, whose motor helps, is refused or reported."""
+    for of in MADE_BY_GEARBOX:
+        hybrid = "hybrid" in of or "split" in of
+        kind = "hybrid, " if hybrid else ""
+        for name in ("ordinary", "motorway"):
+            for equipment in ("full", "IMU 50 Hz, OBD 1 Hz", "no IMU"):
+                yield Pair(
+                    f"{of}/{name}/{equipment}", f"gearbox: {kind}{equipment}", of, equipment,
+                    partial(_seen, drive=name, equipment=equipment), sound=not hybrid,
+                )  # fmt: skip
+
+
 def all_pairs() -> list[Pair]:
     """List all pairs, in an order that stays."""
     return [
         *_of_equipment(), *_cuts(), *_faults(), *_heights(), *_recordings(), *_strangers(),
         *_misread_pairs(), *_in_feet(), *_other_sensors(), *_other_rates(),
+        *_gearboxes(),
     ]  # fmt: skip
 
 

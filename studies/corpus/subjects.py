@@ -17,7 +17,8 @@ import polars as pl
 from accuracy_drives import FULL, bare, scenario
 from fault_subjects import KINDS as OWN_KINDS
 from fault_subjects import polling
-from second_model import Logger, make_drive
+from second_model import VARIANTS, Logger, make_drive, random_variant
+from second_model import Vehicle as SecondVehicle
 from second_model import random_vehicle as second_vehicle
 
 import weighbridge as wb
@@ -48,6 +49,20 @@ SECOND_KINDS: Final = (
     "small_petrol", "petrol", "petrol_dct", "petrol_automatic", "diesel", "van", "truck", "semi",
     "electric_car", "electric_bus",
 )  # fmt: skip
+GEARBOXES: Final = {
+    "stepless": ("petrol_cvt", Logger()),
+    "slipping clutch": ("slipping_clutch", Logger()),
+    "two speeds": ("two_speed_electric", Logger()),
+    "hub motors": ("hub_motors", Logger()),
+    "retarder recorded": ("truck", Logger(torque="percent", retarder=True)),
+    "power split": ("power_split", Logger()),
+    "power split with battery": ("power_split", Logger(battery=True)),
+    "parallel hybrid": ("parallel_hybrid", Logger()),
+    "mild hybrid": ("mild_hybrid", Logger()),
+}
+"""Vehicles of the second model by their gearbox, and what records them; dual clutches, automatics
+and single gears are among `SECOND_KINDS`."""
+
 CLASSES: Final = {"van": "van", "truck": "truck", "semi": "truck", "electric_bus": "bus"}
 
 
@@ -108,9 +123,23 @@ def _own(name: str) -> Subject:
 def _second(kind: str) -> Subject:
     """Make a vehicle of the second model."""
     number = SECOND_KINDS.index(kind)
-    vehicle = second_vehicle(kind, SEED + number)
     heavy = kind in ("truck", "semi")
     logger = Logger(torque="percent") if heavy else Logger()
+    return _driven(second_vehicle(kind, SEED + number), number, logger)
+
+
+def _of_gearbox(name: str) -> Subject:
+    """Make a vehicle of the second model with a gearbox of a kind."""
+    kind, logger = GEARBOXES[name]
+    number = len(SECOND_KINDS) + list(GEARBOXES).index(name)
+    draw = random_variant if kind in VARIANTS else second_vehicle
+    return _driven(draw(kind, SEED + number), number, logger)
+
+
+def _driven(vehicle: SecondVehicle, number: int, logger: Logger) -> Subject:
+    """Drive a vehicle of the second model; ``number`` is that of its seeds."""
+    kind = vehicle.kind
+    heavy = kind in ("truck", "semi")
     room = vehicle.gross - vehicle.tare - 75.0
     plan = {
         "calibration-1": (0.05, "ordinary"),
@@ -179,6 +208,11 @@ MADE: Final[dict[str, Callable[[], Subject]]] = {
 }
 """Subjects that are simulated, and kept."""
 
+MADE_BY_GEARBOX: Final[dict[str, Callable[[], Subject]]] = {
+    f"gearbox {name}": lambda name=name: _of_gearbox(name) for name in GEARBOXES
+}
+"""Those of `GEARBOXES`, which are seen through fewer equipments."""
+
 READ: Final[dict[str, Callable[[], Subject]]] = {
     "foreign hatchback": lambda: _foreign("hatchback"),
     "foreign wagon": lambda: _foreign("wagon"),
@@ -211,7 +245,7 @@ def subject(name: str) -> Subject:
         return READ[name]()
     path = folder() / f"{name.replace(' ', '-')}.pickle"
     if not path.exists():
-        made = MADE[name]()
+        made = (MADE | MADE_BY_GEARBOX)[name]()
         part = path.with_suffix(f".{os.getpid()}")
         part.write_bytes(pickle.dumps(made, pickle.HIGHEST_PROTOCOL))
         part.replace(path)
@@ -220,6 +254,6 @@ def subject(name: str) -> Subject:
 
 def absent(name: str) -> str:
     """Say why a subject cannot be had; empty where it can."""
-    if name in MADE or (SHARED / "data" / "foreign-truck").is_dir():
+    if name in MADE | MADE_BY_GEARBOX or (SHARED / "data" / "foreign-truck").is_dir():
         return ""
     return "recorded drives are not here: no folder ../shared/data beside the checkout"
