@@ -46,8 +46,8 @@ METHODS = {
 FELL_SHORT = (
     "`speed-torque-ekf` misses 3 % by its heights and by speeds alone: of six other vehicles, 30",
     "drives are 4.7 % off (RMS) by heights, and 3.4 % with the true grade. A calibration by",
-    "`--method speed-torque-ekf` is no remedy: 60 drives of the first twelve vehicles are then 3.9 %",
-    "off, and 3.6 % with the file above. Within a vehicle drives scatter by 3.3 %.",
+    "`--method speed-torque-ekf` is no remedy: 60 drives of the first twelve vehicles are then",
+    "3.9 % off, and 3.6 % with the file above. Within a vehicle drives scatter by 3.3 %.",
     "Intervals of `robust-rls`, `ekf` and `hybrid` hold more often than 95 %: they allow for slow",
     "errors of usual size. With noise of 0.7 m/s² on every axis, the (error/std)² of `robust-rls`",
     "is 0.8.",

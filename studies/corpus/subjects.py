@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 import pickle
+import shutil
 import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -232,9 +233,7 @@ def folder() -> Path:
     here.mkdir(parents=True, exist_ok=True)
     for old in home.iterdir():
         if old != here:
-            for path in old.iterdir():
-                path.unlink(missing_ok=True)
-            old.rmdir()
+            shutil.rmtree(old, ignore_errors=True)
     return here
 
 
