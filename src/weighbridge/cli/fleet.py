@@ -13,7 +13,7 @@ from typer.core import TyperCommand, TyperGroup
 
 from weighbridge.cli import fleet_report
 from weighbridge.cli.listed import class_names, method_names
-from weighbridge.cli.options import DbcPaths, MappingPath, Whole
+from weighbridge.cli.options import DbcPaths, Elevation, MappingPath, Whole
 from weighbridge.cli.progress import time_text
 from weighbridge.cli.terminal import complain, console, say, shown
 from weighbridge.cli.verbosity import say_written, watched
@@ -152,6 +152,7 @@ def run(
     whole: Whole = False,
     mapping: MappingPath = None,
     dbc: DbcPaths = None,
+    elevation: Elevation = None,
 ) -> None:
     """Weigh the drives of a fleet in parallel, and continue an earlier run.
 
@@ -171,6 +172,7 @@ def run(
         kind=kind,
         mapping=mapping,
         dbc=tuple(dbc or ()),
+        elevation=elevation,
         whole=whole,
         scheduler=scheduler,
         workers=workers,

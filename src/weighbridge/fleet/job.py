@@ -12,7 +12,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from weighbridge.errors import ConfigError, WeighbridgeError
+from weighbridge.errors import ConfigError, DriveError, WeighbridgeError
 from weighbridge.fleet import remote
 from weighbridge.fleet.inputs import Recording
 from weighbridge.fleet.keys import content_digest, text_digest
@@ -43,6 +43,8 @@ class Job:
     method, settings : as of `weigh`
     dbc : databases of raw CAN logs, seen by all workers
     dbc_digest : of their content
+    elevation : raster of heights, seen by all workers; None for those of the receivers
+    elevation_stamp : by which a change of that file shows
     whole : take the recording as one drive
     known : file of the keys that are there already, in order, one a line; None where none is
     seen : digest of the recording's files as they were listed, and of how they are weighed, to know
@@ -58,6 +60,8 @@ class Job:
     settings: Mapping[str, object] = field(default_factory=dict)
     dbc: tuple[str, ...] = ()
     dbc_digest: str = ""
+    elevation: str | None = None
+    elevation_stamp: str = ""
     whole: bool = False
     known: str | None = None
     seen: int | None = None
@@ -186,6 +190,7 @@ def _key(job: Job, content: str) -> str:
             repr(job.whole),
             repr(job.recording.start),
             job.dbc_digest,
+            *((job.elevation_stamp,) if job.elevation is not None else ()),
         ]
     )
 
@@ -238,13 +243,32 @@ def local_paths(recording: Recording) -> Iterator[list[Path]]:
 
 
 def drives_of(
-    paths: list[Path], mapping: Mapping[str, Any] | None, dbc: tuple[str, ...], *, whole: bool
+    paths: list[Path],
+    mapping: Mapping[str, Any] | None,
+    dbc: tuple[str, ...],
+    *,
+    whole: bool,
+    elevation: str | None = None,
 ) -> list[Drive]:
-    """Read the drives that a recording holds; all of it as one drive where it is ``whole``."""
+    """Read the drives that a recording holds; all of it as one drive where it is ``whole``.
+
+    Heights are those of the raster ``elevation``, where it is given and has any.
+    """
     from weighbridge.io import read_drive, read_drives
 
     given: Path | list[Path] = paths[0] if len(paths) == 1 else paths
-    return [read_drive(given, mapping, dbc)] if whole else read_drives(given, mapping, dbc)
+    drives = [read_drive(given, mapping, dbc)] if whole else read_drives(given, mapping, dbc)
+    return drives if elevation is None else [_by_raster(drive, elevation) for drive in drives]
+
+
+def _by_raster(drive: Drive, elevation: str) -> Drive:
+    """Take a drive's heights from a raster; the receiver's, with a word, outside of it."""
+    from weighbridge.io.elevation import with_elevation
+
+    try:
+        return with_elevation(drive, elevation)
+    except DriveError as error:
+        return drive.with_problems(Problem.of("altitude.no_raster", why=str(error)))
 
 
 def _weighed(job: Job, paths: list[Path]) -> list[dict[str, Any]]:
@@ -252,7 +276,9 @@ def _weighed(job: Job, paths: list[Path]) -> list[dict[str, Any]]:
     from weighbridge.fleet.facts import row_of
     from weighbridge.pipeline.weighing import weigh
 
-    drives = drives_of(paths, job.assigned.mapping, job.dbc, whole=job.whole)
+    drives = drives_of(
+        paths, job.assigned.mapping, job.dbc, whole=job.whole, elevation=job.elevation
+    )
     if job.recording.start is not None:
         begun = job.recording.start
         drives = [

@@ -70,6 +70,7 @@ class Lesson:
     output: str
     whole: bool = False
     dbc: tuple[str, ...] = ()
+    elevation: str | None = None
 
 
 class Drift(NamedTuple):
@@ -93,6 +94,7 @@ def learn_fleet(
     *,
     whole: bool,
     dbc: Sequence[str] = (),
+    elevation: str | None = None,
 ) -> pl.DataFrame:
     """Find the scales of a fleet's vehicles, and refine their files where there are tickets.
 
@@ -103,7 +105,7 @@ def learn_fleet(
     shelf : the vehicle files
     tickets : table of them; None where there is none, and no file is refined
     output : folder of the refined files, none of the old ones
-    whole, dbc : as the drives were weighed
+    whole, dbc, elevation : as the drives were weighed
 
     Returns
     -------
@@ -136,6 +138,7 @@ def learn_fleet(
                         output=str(output.resolve()),
                         whole=whole,
                         dbc=tuple(dbc),
+                        elevation=elevation,
                     )
                 )
         with scheduler_needed(client):
@@ -501,5 +504,11 @@ def _known(row: Mapping[str, Any]) -> Known:
 
 def _read(lesson: Lesson, known: Known) -> Drive:
     with local_paths(Recording(known.paths)) as paths:
-        held = drives_of(paths, lesson.assigned.mapping, lesson.dbc, whole=lesson.whole)
+        held = drives_of(
+            paths,
+            lesson.assigned.mapping,
+            lesson.dbc,
+            whole=lesson.whole,
+            elevation=lesson.elevation,
+        )
         return held[known.part]

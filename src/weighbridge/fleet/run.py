@@ -26,6 +26,7 @@ from weighbridge.fleet.remote import is_url, was_url
 from weighbridge.fleet.store import KEYS, Results
 from weighbridge.fleet.tickets import read_tickets
 from weighbridge.fleet.vehicles import Vehicles
+from weighbridge.io.elevation import refuse_raster
 
 if TYPE_CHECKING:
     import polars as pl
@@ -45,6 +46,7 @@ class FleetSettings:
     kind : class of vehicles without a file; None for a car, if another vehicle has one
     mapping : for all logs; None for the one that each vehicle file names
     dbc : databases of raw CAN logs
+    elevation : raster of heights, see `weighbridge.with_elevation`; None for the receivers'
     whole : take each recording as one drive
     scheduler : address of a Dask cluster; None for workers of this machine
     workers : their number; None for one per core
@@ -58,6 +60,7 @@ class FleetSettings:
     kind: str | None = None
     mapping: Path | None = None
     dbc: tuple[str, ...] = ()
+    elevation: Path | None = None
     whole: bool = False
     scheduler: str | None = None
     workers: int | None = None
@@ -90,6 +93,7 @@ def weigh_drives(
     kind: str | None = None,
     mapping: str | Path | None = None,
     dbc: Sequence[str] = (),
+    elevation: str | Path | None = None,
     whole: bool = False,
     scheduler: str | None = None,
     workers: int | None = None,
@@ -111,6 +115,8 @@ def weigh_drives(
         vehicle of the fleet has a file
     mapping : for all logs; None for the one that each vehicle file names
     dbc : databases of raw CAN logs
+    elevation : raster of heights, see `weighbridge.with_elevation`; None for the receivers', which
+        drives outside of it keep
     whole : take each recording as one drive
     scheduler : address of a Dask cluster; None for workers of this machine
     workers, memory : number and limit of the workers of this machine
@@ -140,6 +146,7 @@ def weigh_drives(
         kind=kind,
         mapping=None if mapping is None else Path(mapping),
         dbc=tuple(dbc),
+        elevation=None if elevation is None else Path(elevation),
         whole=whole,
         scheduler=scheduler,
         workers=workers,
@@ -190,6 +197,7 @@ def run_fleet(
                         how.learn,
                         whole=how.whole,
                         dbc=how.dbc,
+                        elevation=_whole_name(how.elevation),
                     )
                 return count
         finally:
@@ -226,6 +234,8 @@ def prepared(
             f"{folder}: results go to a folder here; mount the store, or copy them there"
         )
     databases = _dbc_digest(how.dbc)
+    if how.elevation is not None:
+        refuse_raster(how.elevation)
     results = Results.begun(folder)
     with results.locked():
         results.clean()
@@ -285,6 +295,8 @@ def _jobs_of(
             settings=how.settings,
             dbc=how.dbc,
             dbc_digest=databases,
+            elevation=_whole_name(how.elevation),
+            elevation_stamp="" if how.elevation is None else stamp([how.elevation]) or "",
             whole=how.whole,
             known=None if known is None else str(known.resolve()),
         )
@@ -305,6 +317,10 @@ def _dbc_digest(paths: Sequence[str]) -> str:
         return text_digest(file_digest(Path(path)) for path in paths)
     except OSError as error:
         raise ConfigError(f"{error.filename}: cannot be read ({error.strerror})") from None
+
+
+def _whole_name(path: Path | None) -> str | None:
+    return None if path is None else str(path.resolve())
 
 
 def _whole_path(recording: Recording) -> Recording:

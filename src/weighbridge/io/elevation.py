@@ -84,6 +84,11 @@ def with_elevation(drive: Drive, raster: str | Path) -> Drive:
     )
 
 
+def refuse_raster(path: Path) -> None:
+    """Raise where a raster cannot be used, as `with_elevation` does, before any drive is read."""
+    _heights(path, np.empty(0), np.empty(0))
+
+
 def _heights(path: Path, latitude: Floats, longitude: Floats) -> Floats:
     """Heights at places (n,) in degrees [m], between the middles of four cells; NaN without."""
     try:
@@ -118,6 +123,8 @@ def _between(raster: Any, row: Floats, column: Floats) -> Floats:
     found = np.full(row.size, np.nan)
     inside = (row >= 0.0) & (column >= 0.0)
     inside &= (row <= raster.height - 1) & (column <= raster.width - 1)
+    if not inside.any():
+        return found
     block = np.stack([row, column])[:, inside].astype(np.int64) // BLOCK
     at = np.flatnonzero(inside)
     for top, left in np.unique(block, axis=1).T * BLOCK:
