@@ -170,8 +170,8 @@ def estimate_torque_delay(
 def clock_shift(drive: Drive, vehicle: Vehicle, motion: Motion, begun: ForceBalance) -> float:
     """Find how much later the torque is than in ``begun`` [s]; 0 where it is not, or none is seen.
 
-    Less than `SAME_CLOCK` is no other clock, nor is what drive and calibration leave open. As much
-    as 0.8 s is believed where it leaves half of the misfit or less, little where the misfit is
+    Less than `SAME_CLOCK` is no other clock, nor is what drive and calibration are unsure of. As
+    much as 0.8 s is believed where it leaves half of the misfit or less, little where the misfit is
     lower there on both sides.
 
     Parameters
