@@ -474,7 +474,7 @@ def test_a_change_of_load_is_found_on_the_way(car, loaded):
     scale = wb.LiveScale(car, info=made.drive.info, step=LONGEST_STEP)
     part = made.drive.between(made.drive.start, made.drive.start + 640.0)
     told = fed(scale, part, even(part, 20.0))
-    low, high = told.interval(0.99)
+    low, high = told.interval()
     assert low < made.scenario.mass + 500.0 < high
     assert high - low < 0.2 * told.mass
     assert scale._move.this_load < 0.7 * told.driven

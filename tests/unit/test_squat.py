@@ -82,7 +82,7 @@ def test_what_the_calibration_left_in_is_put_back(weighed):
     without = calibrated(car, None)
     as_calibrated = joint.estimate(seen(balance, None, factor=1.0), without)
     shown = joint.estimate(seen(balance, K, factor=0.0), without)
-    assert_allclose(shown.mass, as_calibrated.mass, rtol=5e-4)
+    assert_allclose(shown.mass, as_calibrated.mass, rtol=1e-5)
     # Left as it is, the reading would be too small by 1 + g k.
     assert joint.estimate(seen(balance, None, factor=0.0), without).mass > 1.01 * shown.mass
 

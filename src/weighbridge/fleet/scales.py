@@ -62,6 +62,10 @@ STRAY: Final = 0.02 / np.log(4.0)
 """Density of a ticket or a lightest cluster that fits nothing: one in fifty, evenly from half to
 twice the mass by its logarithm, as ticket or file are of another vehicle [-]. An assumption."""
 
+UNLIKELY: Final = -500.0
+"""Least logarithm of a likelihood over the highest [-]: doubles end at -708, and a few hundred
+tickets go beyond."""
+
 LEAST_STD: Final = 0.003
 """No drive or ticket is more exact than this [-]: weighbridges of 60 t show steps of 20 kg, half of
 one in 3500 kg."""
@@ -175,7 +179,8 @@ def _likelihoods(one: Weighed) -> Floats:
     wide = np.maximum(one.own, LEAST_STD)
     off = np.log(one.mass[known] / one.known[known]) - x[:, None]
     by_ticket = np.log(_normal(off, wide[known]) + STRAY).sum(axis=1)
-    by_ticket = np.exp(by_ticket - by_ticket.max())
+    # So unlikely is out of the question, and still a number that can be divided by.
+    by_ticket = np.exp(np.maximum(by_ticket - by_ticket.max(), UNLIKELY))
     if not np.isfinite(one.tare) or not one.gross > one.tare:
         return np.stack([0.0 * by_ticket, 0.0 * by_ticket, by_ticket])
     tare, room = _tare_std(one), float(np.log(one.gross / one.tare))
