@@ -29,6 +29,7 @@ from typing import Any, Final
 
 import numpy as np
 import polars as pl
+from pages import filled
 
 import weighbridge as wb
 from fleet import joined, truth
@@ -198,8 +199,8 @@ def of_seed(seed: int) -> dict[str, tuple[pl.DataFrame, pl.DataFrame, dict[str, 
         for name, path in (("as weighed", None), ("no ticket", None), ("a ticket", tickets)):
             if name != "as weighed":
                 learn_scales(folder, shelf, path)
-            told = wb.fleet.report(folder)
-            found[name] = judged(folder, fleet), told.learnt, told.totals
+            report = wb.fleet.report(folder)
+            found[name] = judged(folder, fleet), report.learnt, report.totals
     return found
 
 
@@ -221,9 +222,11 @@ def of_drives(home: Path) -> tuple[pl.DataFrame, pl.DataFrame, int]:
         replace(car, torque=replace(car.torque, coefficients=(0.0, scale))).save(path)
     drives = str(made / "drives.csv"), "--vehicles", str(cars), "-o", str(results)
     command("fleet", *drives, "--workers", "1", "--learn", str(home / "learnt"))
-    told = wb.fleet.report(results)
-    legs = joined(told, truth(made)).filter(pl.col("mass_kg").is_not_null(), pl.col("fault") == "")
-    return legs, told.learnt, len(list(cars.glob("*.toml")))
+    report = wb.fleet.report(results)
+    legs = joined(report, truth(made)).filter(
+        pl.col("mass_kg").is_not_null(), pl.col("fault") == ""
+    )
+    return legs, report.learnt, len(list(cars.glob("*.toml")))
 
 
 def command(*words: str) -> None:
@@ -272,15 +275,15 @@ def figures(
     )
     worse = 100.0 * (each["after"] - each["before"])
     moved = rows.group_by("fleet", maintain_order=True).agg(pl.col("moved").sum())["moved"]
-    told = np.array([t["tkm"] for t in totals])
+    found = np.array([t["tkm"] for t in totals])
     reach = np.array([1.96 * t["tkm_std"] for t in totals])
-    off = told / moved.to_numpy() - 1.0
+    off = found / moved.to_numpy() - 1.0
     return (
         f"{rms(rows):.2f} % | {max(rms(f) for f in legs):.2f} % | "
         f"{100.0 * rows['held'].mean():.1f} % | {(worse > 0.5).sum()} of {worse.len()} | "
         f"{worse.max():+.1f} % | {100.0 * np.sqrt(np.mean(off**2)):.1f} % | "
-        f"± {100.0 * np.mean(reach / told):.1f} % | "
-        f"{int((np.abs(told - moved.to_numpy()) < reach).sum())} of {len(told)}"
+        f"± {100.0 * np.mean(reach / found):.1f} % | "
+        f"{int((np.abs(found - moved.to_numpy()) < reach).sum())} of {len(found)}"
     )
 
 
@@ -325,7 +328,7 @@ def main() -> None:
     lists = {name: [list(column) for column in zip(*(f[name] for f in found), strict=True)]
              for name in kinds}  # fmt: skip
     names = ("as weighed", "learnt without a ticket", "learnt with one ticket per type")
-    filled = {
+    values = {
         "rows": "\n".join(
             f"| {name} | {figures(*lists[kind])} |" for kind, name in zip(kinds, names, strict=True)
         ),
@@ -334,13 +337,11 @@ def main() -> None:
         "date": f"{datetime.now():%d %B %Y}".lstrip("0"),
     }
     if given.tuned:
-        print("\n".join(filled.values()))
+        print("\n".join(values.values()))
         return
     with tempfile.TemporaryDirectory() as home:
-        filled["simulated"] = sentences(*of_drives(Path(home)))
-    text = (HERE / "fleet_scale.template.md").read_text(encoding="utf-8")
-    for key, value in filled.items():
-        text = text.replace("{" + key + "}", value)
+        values["simulated"] = sentences(*of_drives(Path(home)))
+    text = filled(HERE / "fleet_scale.template.md", values)
     (HERE / "fleet_scale.md").write_text(text, encoding="utf-8")
 
 

@@ -22,6 +22,7 @@ from typing import Final
 
 import numpy as np
 from accuracy_drives import FULL, bare, scenario
+from pages import filled
 from second_model import VARIANTS, Logger, make_drive, random_variant, random_vehicle
 
 import weighbridge as wb
@@ -204,11 +205,9 @@ def main() -> None:
                 print(f"  {100.0 * error:+.1f} ± {100.0 * std:.1f} %", *sorted(ids))
     if given.tuning:
         return
-    text = (HERE / "gearboxes.template.md").read_text(encoding="utf-8")
     table = "\n".join(rows[kind] for kind in KINDS if kind in rows)
-    filled = {"rows": table, "date": f"{datetime.now():%d %B %Y}".lstrip("0")}
-    for key, value in filled.items():
-        text = text.replace("{" + key + "}", value)
+    values = {"rows": table, "date": f"{datetime.now():%d %B %Y}".lstrip("0")}
+    text = filled(HERE / "gearboxes.template.md", values)
     page.write_text(text, encoding="utf-8")
 
 

@@ -20,6 +20,7 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 from other_simulators import CALIBRATIONS, CLASSES, DRIVER, DRIVES, FOREIGN, KINDS, VEHICLES, masses
+from pages import filled
 from second_model import make_drive, random_vehicle
 
 import weighbridge as wb
@@ -216,7 +217,7 @@ def beside_batch(runs: list[Run]) -> str:
 def page(ours: list[Run], theirs: list[Run]) -> str:
     """Fill the template."""
     absent = "The drives are not here."
-    filled = {
+    values = {
         "second_first": first_mass(ours),
         "second_moments": "\n".join(moments(ours)),
         "second_batch": beside_batch(ours),
@@ -225,10 +226,7 @@ def page(ours: list[Run], theirs: list[Run]) -> str:
         "foreign_moments": "\n".join(moments(theirs)) if theirs else absent,
         "foreign_batch": beside_batch(theirs) if theirs else "",
     }
-    text = (HERE / "live.template.md").read_text(encoding="utf-8")
-    for key, value in filled.items():
-        text = text.replace("{" + key + "}", value)
-    return text
+    return filled(HERE / "live.template.md", values)
 
 
 def main() -> int:

@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
+from pages import filled
 from second_model import Logger, Vehicle, make_drive, random_vehicle
 
 import weighbridge as wb
@@ -158,15 +159,13 @@ def main() -> None:
             rows.append(sum(of.values(), Results()).row(f"{recorded}, {by}"))
         each += [found[job][0].row(f"{job[0]} {job[1]}, {recorded}") for job in of]
         refused += [f"- {why}" for job in of for why in found[job][0].refused]
-    filled = {
+    values = {
         "rows": "\n".join(rows),
         "each": "\n".join(each),
         "refused": "\n".join(refused) or "No calibration was refused.",
         "date": f"{datetime.now():%d %B %Y}".lstrip("0"),
     }
-    text = (HERE / "truck_fleet.template.md").read_text(encoding="utf-8")
-    for key, value in filled.items():
-        text = text.replace("{" + key + "}", value)
+    text = filled(HERE / "truck_fleet.template.md", values)
     (HERE / "truck_fleet.md").write_text(text, encoding="utf-8")
 
 

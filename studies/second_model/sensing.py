@@ -31,7 +31,7 @@ class Logger:
     imu_quality : 1 for a phone or a cheap logger, 0 for a sensor without errors
     mount : "aligned" within some degrees, or "any"
     gnss : whether there is any
-    gnss_speed : whether it tells speed and course
+    gnss_speed : whether it gives speed and course
     late : time by which stamps may be late, at the most [s]
     delays : whether control units answer late
     """

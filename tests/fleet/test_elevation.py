@@ -8,6 +8,8 @@ import pytest
 
 import weighbridge as wb
 from tests.fleet.fleets import real_fleet
+from weighbridge.fleet.job import weigh_job
+from weighbridge.fleet.run import FleetSettings, prepared
 from weighbridge.io import write_drive
 
 pytestmark = pytest.mark.skipif(find_spec("rasterio") is None, reason="rasterio is not installed")
@@ -58,6 +60,19 @@ def test_drives_on_the_raster_have_its_heights_and_others_say_so(fleet, schedule
     assert by_raster["elsewhere"]["mass_kg"] == plain["elsewhere"]["mass_kg"]
     # Other hills are another mass.
     assert by_raster["on it"]["mass_kg"] != pytest.approx(plain["on it"]["mass_kg"], rel=5e-4)
+
+
+def test_a_raster_that_a_worker_cannot_read_fails_and_is_tried_again(fleet, scheduler, tmp_path):
+    drive, drives, cars = fleet
+    ground = ground_under(drive, tmp_path / "ground.tif")
+    with prepared(
+        [f"{drives}/**"], cars, tmp_path / "results", FleetSettings(elevation=ground)
+    ) as jobs:
+        job = next(iter(jobs))
+        ground.rename(tmp_path / "away.tif")
+        assert weigh_job(job).outcome == "failed"
+        (tmp_path / "away.tif").rename(ground)
+        assert weigh_job(job).outcome == "weighed"
 
 
 def test_a_raster_that_cannot_be_read_is_refused_before_any_drive(fleet, scheduler, tmp_path):

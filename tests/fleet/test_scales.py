@@ -14,6 +14,7 @@ import weighbridge as wb
 from tests.fleet.fleets import tiny_drive
 from tests.fleet.made_rows import drive
 from weighbridge.fleet.kept import keep_legs
+from weighbridge.fleet.scales import Weighed, find_scales
 from weighbridge.fleet.store import Results, write_part
 from weighbridge.fleet.vehicles import Vehicles
 from weighbridge.vehicle.known import Known, describe
@@ -213,6 +214,23 @@ def test_one_ticket_of_another_vehicle_of_the_type_makes_it_better(tmp_path, sch
         own = pl.col("vehicle_id") == name
         assert abs(better.filter(own)["error"].mean()) < abs(legs.filter(own)["error"].mean())
     assert taught["truck0"]["drives"] == 1
+
+
+def test_a_ticket_for_each_drive_of_a_year_leaves_a_number():
+    """By itself each makes other scales unlikely; together by more than a double can hold."""
+    true, weighed = runs(1, 0.05, count=400)
+    many = Weighed("many", "tipper", weighed, np.full(400, 0.003), true, STATED, TARE, GROSS, 200.0)
+    other = many._replace(vehicle="other", known=np.full(400, math.nan))
+    for scale in find_scales([many, other]):
+        assert scale.factor == pytest.approx(math.exp(-0.05), abs=0.005)
+        assert 0.0 < scale.std < 0.02
+
+
+def test_what_was_learnt_is_written_anew_where_it_is_damaged(fleet, scheduler):
+    _, learnt = fleet.learn(scheduler)
+    (fleet.results / "learnt.parquet").write_bytes(b"no table")
+    _, again = fleet.learn(scheduler)
+    assert again == learnt
 
 
 def test_little_is_learnt_from_little(tmp_path, scheduler):

@@ -43,8 +43,8 @@ the slip, and half of the load is on driven wheels (Gillespie, Fundamentals of V
 1992, ch. 10)."""
 
 RATE_SPAN: Final = 0.2
-"""The rate of an engine speed is looked at over so long before and after [s]: with 0.4 s masses of six
-pairs of the corpus with a stepless gearbox change by 0.2 % at most."""
+"""The rate of an engine speed is looked at over so long before and after [s]: with 0.4 s the masses
+of six pairs of the corpus with a stepless gearbox change by 0.2 % at most."""
 
 SHIFT_MARGIN: Final = 0.4
 """Samples nearer than this to a change of gear are left out [s]."""

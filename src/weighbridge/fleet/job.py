@@ -12,7 +12,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from weighbridge.errors import ConfigError, DriveError, WeighbridgeError
+from weighbridge.errors import ConfigError, WeighbridgeError
 from weighbridge.fleet import remote
 from weighbridge.fleet.inputs import Recording
 from weighbridge.fleet.keys import content_digest, text_digest
@@ -263,11 +263,11 @@ def drives_of(
 
 def _by_raster(drive: Drive, elevation: str) -> Drive:
     """Take a drive's heights from a raster; the receiver's, with a word, outside of it."""
-    from weighbridge.io.elevation import with_elevation
+    from weighbridge.io.elevation import NoHeightsError, with_elevation
 
     try:
         return with_elevation(drive, elevation)
-    except DriveError as error:
+    except NoHeightsError as error:
         return drive.with_problems(Problem.of("altitude.no_raster", why=str(error)))
 
 

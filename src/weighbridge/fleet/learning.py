@@ -21,6 +21,7 @@ from weighbridge.fleet.remote import by_url
 from weighbridge.fleet.scales import Weighed, find_scales
 from weighbridge.fleet.tickets import read_tickets, ticketed, with_tickets
 from weighbridge.fleet.vehicles import Assigned, Vehicles
+from weighbridge.io.quiet import PARSE_ERRORS, quietly
 from weighbridge.messages import Problem
 from weighbridge.pipeline.given import mapping_beside
 from weighbridge.signals import Drive, Floats
@@ -188,8 +189,8 @@ def learn_scales(
     )  # fmt: skip
     rows = rows.join(current, on=["vehicle_id", "vehicle_digest"], how="semi")
     rows = rows.filter(pl.col("mass_kg") > 0.0).drop_nulls(["std_kg", "shared_kg"])
-    told = [] if tickets is None else read_tickets(tickets)
-    known = with_tickets(rows, told).select("key", "part", "leg", "ticket_kg")
+    reported = [] if tickets is None else read_tickets(tickets)
+    known = with_tickets(rows, reported).select("key", "part", "leg", "ticket_kg")
     rows = rows.join(known, on=["key", "part", "leg"], how="left")
     fleet = [
         _weighed(str(vehicle), car, own)
@@ -219,10 +220,19 @@ def learn_scales(
     frame = frame.sort("vehicle_id")
     path = results / LEARNT
     # Written only where it changed: the legs are made anew after it.
-    if not (path.exists() and pl.read_parquet(path).equals(frame)):
+    if not _holds(path, frame):
         with whole_file(path) as part:
             frame.write_parquet(part)
     return frame
+
+
+def _holds(path: Path, frame: pl.DataFrame) -> bool:
+    """Say whether a file has this table; one that is damaged has not."""
+    try:
+        with path.open("rb") as file, quietly():
+            return pl.read_parquet(file).equals(frame)
+    except (*PARSE_ERRORS, OSError):
+        return False
 
 
 _OF_SCALE: Final = tuple(COLUMNS)[list(COLUMNS).index("vehicle_digest") :]

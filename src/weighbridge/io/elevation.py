@@ -31,6 +31,10 @@ RECEIVER_STD: Final = 3.0
 """Least standard deviation of a receiver's heights [m]."""
 
 
+class NoHeightsError(DriveError):
+    """A raster has no height for a drive: it has no positions, or they are outside of it."""
+
+
 def with_elevation(drive: Drive, raster: str | Path) -> Drive:
     """Take the heights of a drive from an elevation raster, at the positions of its fixes.
 
@@ -62,12 +66,12 @@ def with_elevation(drive: Drive, raster: str | Path) -> Drive:
     check_path("raster", raster)
     latitude, longitude = drive.get("latitude"), drive.get("longitude")
     if latitude is None or longitude is None or not len(latitude):
-        raise DriveError(f"{drive.name}: no positions, which heights of {raster} need")
+        raise NoHeightsError(f"{drive.name}: no positions, which heights of {raster} need")
     time = latitude.time
     heights = _heights(Path(raster), np.degrees(latitude.values), np.degrees(longitude.at(time)))
     inside = np.isfinite(heights)
     if np.count_nonzero(inside) < 2:
-        raise DriveError(
+        raise NoHeightsError(
             f"{raster}: holds no height at the positions of {drive.name} (it begins at latitude "
             f"{np.degrees(latitude.values[0]):.3f}, longitude {np.degrees(longitude.values[0]):.3f}"
             "): give the raster of that region"

@@ -1,0 +1,22 @@
+"""Pages of studies are their templates with figures."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+HOME = Path(__file__).parents[2]
+PAGES = {
+    "live": "docs/live_figures.md",
+    "fleet_scale": "studies/fleet_scale.md",
+    "gearboxes": "studies/gearboxes.md",
+    "truck_fleet": "studies/truck_fleet.md",
+}
+
+
+@pytest.mark.parametrize("study", PAGES)
+def test_a_page_is_its_template_with_figures(study):
+    template = (HOME / "studies" / f"{study}.template.md").read_text(encoding="utf-8")
+    pattern = re.sub(r"\\\{\w+\\\}", ".+?", re.escape(template))
+    page = (HOME / PAGES[study]).read_text(encoding="utf-8")
+    assert re.fullmatch(pattern, page, re.DOTALL)
