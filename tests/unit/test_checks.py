@@ -35,14 +35,14 @@ CAR = Vehicle(
 
 
 @cache
-def make_drive(seed=1, mounting=(0.02, -0.1, 0.6), duration=900.0, bends=1.0):
-    """Drive 15 min at 3 to 27 m/s through bends, at 48 degrees north."""
+def make_drive(seed=1, mounting=(0.02, -0.1, 0.6), duration=900.0, bends=1.0, loop=None):
+    """Drive 15 min at 3 to 27 m/s through bends, at 48 degrees north; 10 to 11 min by ``loop``."""
     rng = np.random.default_rng(seed)
     t = np.arange(0.0, duration, 0.02)
     v = 15.0 + 8.0 * np.sin(2 * np.pi * t / 60.0) + 4.0 * np.sin(2 * np.pi * t / 17.0)
     a = np.gradient(v, t)
     yaw_rate = 0.08 * np.sin(2 * np.pi * t / 40.0) + 0.03 * np.sin(2 * np.pi * t / 23.0) + 0.005
-    yaw_rate *= bends
+    yaw_rate *= np.where((t > 600.0) & (t < 660.0), loop or bends, bends)
     course = 0.7 + np.cumsum(yaw_rate) * 0.02
     grade = 0.03 * np.sin(2 * np.pi * t / 200.0)
     body = np.column_stack((a + 9.81 * grade, v * yaw_rate, np.full_like(t, -9.81)))
@@ -203,6 +203,20 @@ def test_slow_gyro_in_degrees_is_seen_against_the_course():
 def test_gyro_in_radians_under_degrees(sane):
     found = only(scaled(sane, **dict.fromkeys(GYRO, np.pi / 180)))
     assert (found.id, found.values["unit"]) == ("imu.gyro_unit", "rad/s")
+
+
+def test_positions_that_scatter_do_not_judge_the_unit_of_a_gyro():
+    # A motorway, one loop of a ramp, and two minutes of fixes that are 10 m off.
+    drive = make_drive(bends=0.02, loop=1.5)
+    lost = [drive.signals[name] for name in ("latitude", "longitude")]
+    noise = np.random.default_rng(2).normal(0.0, 10.0 / 6.371e6, (2, len(lost[0])))
+    noise *= (lost[0].time > 100.0) & (lost[0].time < 220.0)
+    scattered = drive.with_signals(
+        *(replace(s, values=s.values + n) for s, n in zip(lost, noise, strict=True))
+    )
+    assert not any(p.id == "imu.gyro_unit" for p in check_drive(scattered))
+    wrong = scaled(scattered, **dict.fromkeys(GYRO, np.pi / 180))
+    assert any(p.id == "imu.gyro_unit" for p in check_drive(wrong))
 
 
 MPH_UNDER_KMH = 0.621371

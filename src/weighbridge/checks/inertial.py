@@ -111,14 +111,14 @@ def _check_rate(drive: Drive, gyro: tuple[Signal, Signal, Signal]) -> Iterator[P
         return
     bias = np.median(rate[full], axis=0)
     angle = np.linalg.norm(rate - bias, axis=1) * step
-    ratio = float(np.median(angle[turning] / np.abs(change[turning])))
+    # Positions that scatter turn as well. Their turns are not the gyro's, so the gyro weights them.
+    ratio = float(angle[turning] @ angle[turning] / (angle[turning] @ np.abs(change[turning])))
     if ratio > 15.0:
         unit, said = "deg/s", "gyro_x_degps"
     elif ratio < 1.0 / 15.0:
         unit, said = "rad/s", "gyro_x_radps"
     else:
         return
-    # Positions that scatter turn as well, but not when the gyro does.
     if np.corrcoef(angle[full], np.abs(change[full]))[0, 1] < _TURN_TOGETHER:
         return
     yield Problem.of("imu.gyro_unit", "gyro_x", serious=True, ratio=ratio, unit=unit, column=said)
