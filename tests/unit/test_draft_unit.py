@@ -6,8 +6,10 @@ import numpy as np
 import polars as pl
 import pytest
 
+from weighbridge import read_drive
 from weighbridge.io.draft import draft
 from weighbridge.io.formats import format_of
+from weighbridge.io.mapping_text import mapping_text
 from weighbridge.signals.units import UNITS
 
 TIME = np.arange(0.0, 900.0, 0.5)
@@ -63,3 +65,30 @@ def test_fleet_telemetry_with_positions_is_in_mph(tmp_path):
         records.append(json.dumps({"data": data}))
     (tmp_path / "t.jsonl").write_text("\n".join(records))
     assert unit_of(tmp_path / "t.jsonl") == "mph"
+
+
+E7, SEMICIRCLE = 1e7, 2**31 / 180.0
+
+
+@pytest.mark.parametrize(
+    ("names", "factor", "unit"),
+    [
+        (("pos_lat_e7", "pos_lon_e7"), E7, "dege7"),
+        (("latitudeE7", "longitudeE7"), E7, "dege7"),
+        (("Lat (deg*1e7)", "Lon (deg*1e7)"), E7, "dege7"),
+        (("lat", "lon"), E7, "dege7"),
+        (("position_lat [semicircles]", "position_long [semicircles]"), SEMICIRCLE, "semicircle"),
+        (("position_lat", "position_long"), SEMICIRCLE, "semicircle"),
+    ],
+)
+def test_whole_numbers_of_positions_are_read(tmp_path, names, factor, unit):
+    place = (-33.9 + np.degrees(WAY), np.full(TIME.size, 151.2))
+    table = {"time_s": TIME, "Vehicle speed (km/h)": 3.6 * SPEED, "RPM": 900 + 50 * SPEED}
+    table |= {n: np.round(factor * v).astype(int) for n, v in zip(names, place, strict=True)}
+    pl.DataFrame(table).write_csv(tmp_path / "t.csv")
+    found = draft(tmp_path / "t.csv")
+    (tmp_path / "m.toml").write_text(mapping_text([found]), encoding="utf-8")
+    drive = read_drive(tmp_path / "t.csv", tmp_path / "m.toml")
+    assert [c.unit for c in found.columns if c.quantity in ("latitude", "longitude")] == [unit] * 2
+    for name, true in zip(("latitude", "longitude"), place, strict=True):
+        np.testing.assert_allclose(np.degrees(drive.signals[name].values), true, atol=1e-6)

@@ -112,10 +112,16 @@ def gyro_checked(columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, ...]:
 
 
 def position_checked(columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, ...]:
-    """Take positions for radians that would lie at sea in degrees: there is no land within 1.57
-    degrees of the equator and 3.15 degrees of Greenwich.
+    """Give both coordinates one unit. They are in radians if they would lie at sea in degrees:
+    there is no land within 1.57 degrees of the equator and 3.15 degrees of Greenwich.
     """
     place = {c.quantity: c for c in columns if c.quantity in ("latitude", "longitude")}
+    if {c.unit for c in place.values() if not c.stated} == {"dege7", "semicircle"}:
+        question = "states no unit; taken as semicircle: 180 degrees are 1.8e9 at most in 1e-7 deg"
+        return tuple(
+            replace(c, unit="semicircle", question=question) if c in place.values() else c
+            for c in columns
+        )
     sizes = {q: max(abs(c.low), abs(c.high)) for q, c in place.items() if not c.stated}
     if sizes.keys() != {"latitude", "longitude"} or max(sizes.values()) < _NULL_ISLAND:
         return columns

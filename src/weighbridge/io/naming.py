@@ -374,7 +374,11 @@ def unit_of(name: str) -> tuple[str | None, tuple[str, ...]]:
     humps = _CAMEL.sub(" ", parts[-1]).split()
     for count in (2, 1):
         tail = "".join(humps[-count:])
-        if len(humps) > count and len(tail) > 2 and (suffix := unit_suffix(tail)) is not None:
+        if (
+            len(humps) > count
+            and (len(tail) > 2 or tail == "E7")
+            and (suffix := unit_suffix(tail)) is not None
+        ):
             return suffix, words[: len(words) - len(words_of(" ".join(humps[-count:])))]
     last = name.split()
     if len(last) > 1 and (suffix := unit_suffix(last[-1].strip("()[],;"))) is not None:

@@ -53,6 +53,8 @@ UNITS: Final[dict[str, Unit]] = {
     "rpm": Unit("rad/s", math.pi / 30.0),
     "rad": Unit("rad", 1.0),
     "deg": Unit("rad", math.pi / 180.0),
+    "dege7": Unit("rad", 1e-7 * math.pi / 180.0),
+    "semicircle": Unit("rad", math.pi / 2**31),
     "nm": Unit("N m", 1.0),
     "lbft": Unit("N m", 4.4482216152605 * 0.3048),
     "n": Unit("N", 1.0),
