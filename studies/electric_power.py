@@ -1,6 +1,6 @@
 """Do the intervals hold that power of the motor and of the battery give? Run me.
 
-    python studies/electric_power.py
+    python studies/electric_power.py --seed 9033000 --cars 5 --minutes 20
 
 Simulated electric cars tell motor power over vehicle speed (``power_by_speed``) or battery
 voltage and current (``battery``). Each car has losses, meters and a heater of its own.
@@ -9,6 +9,7 @@ It is weighed with a data sheet's vehicle file, and after calibrations on one an
 
 from __future__ import annotations
 
+import argparse
 import math
 import sys
 from dataclasses import replace
@@ -22,12 +23,9 @@ from weighbridge.papers.jensen2022_drives import without_weather
 from weighbridge.simulation import SimulatedDrive, random_vehicle, simulate_car, usual_polling
 from weighbridge.vehicle.model import Driveline, TorqueModel, Vehicle
 
-SEED: Final = 161_000
-CARS: Final = 10
 LOADS: Final = (0.0, 250.0, 120.0, 330.0, 60.0)
 """Payloads; the first two drives are those of the calibrations [kg]."""
 
-DURATION: Final = 1500.0
 NAMES: Final = {
     "power_by_speed": ("engine_power",),
     "battery": ("battery_current", "battery_voltage"),
@@ -127,9 +125,8 @@ def with_power(made: SimulatedDrive, train: Powertrain, rng: np.random.Generator
     )
 
 
-def of_car(number: int) -> list[Result]:
-    """Weigh the drives of one car by each source and vehicle file."""
-    seed = SEED + 100 * number
+def of_car(seed: int, duration: float) -> list[Result]:
+    """Weigh the drives [s] of one car by each source and vehicle file."""
     rng = np.random.default_rng([seed, 5])
     car = random_vehicle(rng, "electric")
     train = drawn(rng)
@@ -137,7 +134,7 @@ def of_car(number: int) -> list[Result]:
     made = [
         simulate_car(
             replace(
-                scenario(car, rng, load=load, seed=seed + k, polling=polling), duration=DURATION
+                scenario(car, rng, load=load, seed=seed + k, polling=polling), duration=duration
             )
         )
         for k, load in enumerate(LOADS)
@@ -155,7 +152,7 @@ def of_car(number: int) -> list[Result]:
             try:
                 files[f"{count} drives"] = wb.calibrate(seen[:count], masses[:count], vehicle=base)
             except wb.WeighbridgeError as error:
-                print(f"car {number}, {source}, {count} drives: {error}", file=sys.stderr)
+                print(f"car {seed}, {source}, {count} drives: {error}", file=sys.stderr)
         for name, file in files.items():
             for drive, truth in zip(seen[2:], made[2:], strict=True):
                 found += _weighed(source, name, drive, file, final_mass(truth))
@@ -174,8 +171,16 @@ def _weighed(source: str, name: str, drive: wb.Drive, file: Vehicle, true: float
 
 def main() -> None:
     """Print a table: errors, standard deviations and how many intervals hold."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seed", type=int, default=161_000, help="of the first car")
+    parser.add_argument("--cars", type=int, default=10)
+    parser.add_argument("--minutes", type=float, default=25.0, help="length of a drive")
+    given = parser.parse_args()
     compile_all()
-    rows = [r for part in shared_out([(of_car, (k,)) for k in range(CARS)]) for r in part]
+    seeds = range(given.seed, given.seed + 100 * given.cars, 100)
+    rows = [
+        r for part in shared_out([(of_car, (s, 60.0 * given.minutes)) for s in seeds]) for r in part
+    ]
     print("| source | vehicle file | masses | mean error | RMS | mean std | worst / std | held |")
     print("|---|---|---|---|---|---|---|---|")
     for source in NAMES:

@@ -49,7 +49,9 @@ Made = tuple[Drive, float, float]
 """A drive with its mass as it begins and as it ends [kg]."""
 
 
-def _second(kind: str, logger: Logger, seed: int) -> Iterator[tuple[wb.Vehicle, list[Made]]]:
+def _second(
+    kind: str, logger: Logger, seed: int, base: str | None = None
+) -> Iterator[tuple[wb.Vehicle, list[Made]]]:
     vehicle = (random_variant if kind in VARIANTS else random_vehicle)(kind, seed)
     heavy = {"truck": "truck", "semi": "truck", "electric_bus": "bus"}
     plan = [*((part, "ordinary") for part in KNOWN), *WEIGHED]
@@ -64,7 +66,7 @@ def _second(kind: str, logger: Logger, seed: int) -> Iterator[tuple[wb.Vehicle, 
             )["mass_kg"]  # fmt: skip
             (folder / "drive.toml").unlink()
             made.append((wb.read_drive(folder), float(truth[0]), float(truth[-1])))
-    yield wb.Vehicle(kind=heavy.get(vehicle.kind, "car")), made
+    yield wb.Vehicle(kind=base or heavy.get(vehicle.kind, "car")), made
 
 
 def _own(kind: str, seed: int) -> Iterator[tuple[wb.Vehicle, list[Made]]]:
@@ -86,6 +88,7 @@ def _own(kind: str, seed: int) -> Iterator[tuple[wb.Vehicle, list[Made]]]:
 
 PLAIN: Final = Logger()
 BATTERY: Final = Logger(battery=True)
+BOTH: Final = Logger(battery=True, torque="nm")
 RETARDER: Final = Logger(torque="percent", retarder=True)
 
 KINDS: Final[dict[str, Callable[[int], Iterator[tuple[wb.Vehicle, list[Made]]]]]] = {
@@ -104,8 +107,14 @@ KINDS: Final[dict[str, Callable[[int], Iterator[tuple[wb.Vehicle, list[Made]]]]]
     ),
     "power split": lambda seed: _second("power_split", PLAIN, seed),
     "power split, battery recorded": lambda seed: _second("power_split", BATTERY, seed),
+    "power split, battery and torque recorded, class stated": lambda seed: _second(
+        "power_split", BOTH, seed, "hybrid"
+    ),
     "parallel hybrid": lambda seed: _second("parallel_hybrid", PLAIN, seed),
     "parallel hybrid, battery recorded": lambda seed: _second("parallel_hybrid", BATTERY, seed),
+    "parallel hybrid, battery and torque recorded, class stated": lambda seed: _second(
+        "parallel_hybrid", BOTH, seed, "hybrid"
+    ),
     "mild hybrid": lambda seed: _second("mild_hybrid", PLAIN, seed),
     "mild hybrid, battery recorded": lambda seed: _second("mild_hybrid", BATTERY, seed),
 }

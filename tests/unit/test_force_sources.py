@@ -4,11 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.ndimage import uniform_filter1d
 from tests.noted import refused
 
 import weighbridge as wb
 from weighbridge.papers.jensen2022_drives import without_weather
 from weighbridge.simulation import make_scenario, random_vehicle, simulate_car, usual_polling
+from weighbridge.vehicle.force_sources import ENGINE_INERTIA
 from weighbridge.vehicle.model import Driveline, TorqueModel
 from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
 
@@ -155,3 +157,68 @@ def test_the_sign_of_the_current_does_not_matter(driven):
     np.testing.assert_allclose(
         source.reading(drive, time, model), source.reading(turned, time, model)
     )
+
+
+def test_a_power_is_over_the_speed_of_the_motion_not_a_late_reading(driven):
+    names = ("battery_current", "battery_voltage")
+    known, loaded = (drive_of(d, names, engine_speed=False) for d in driven["electric"])
+    car = wb.calibrate(known, float(driven["electric"][0][0].truth.mass[0]))
+    speed = loaded.signals["vehicle_speed"]
+    late = loaded.with_signals(replace(speed, time=speed.time + 0.5))
+    assert wb.weigh(late, car).mass == pytest.approx(wb.weigh(loaded, car).mass, rel=0.004)
+
+
+def split(drive):
+    """Let a motor and an engine that turns as it likes share the power of a drive."""
+    made, _ = drive
+    truth, time = made.truth, np.arange(made.truth.time[0] + 0.2, made.truth.time[-1], 0.2)
+
+    def at(values):
+        return np.interp(time - LATE, truth.time, values)
+
+    power = truth.traction_force * truth.speed / 0.95
+    asked = uniform_filter1d(np.maximum(power, 0.0), 150)
+    on = uniform_filter1d((asked > 5e3).astype(float), 25) > 0.5
+    engine = np.where(on, np.maximum(asked, 4e3), 0.0)
+    turns = uniform_filter1d(np.where(on, 110.0 + 250.0 * (engine / 6e4) ** 0.7, 0.0), 25)
+    step = float(np.median(np.diff(truth.time)))
+    spun = ENGINE_INERTIA * np.gradient(turns, step)
+    torque = np.where(on, engine / np.maximum(turns, 60.0) + spun, 0.0)
+    motor = power - torque * turns + spun * turns - at_brakes(truth)
+    battery = np.where(motor > 0.0, motor / 0.92, motor * 0.92) + AUX
+    signals = {"engine_torque": torque, "engine_speed": turns, "battery_current": battery / METER}
+    plain = without_weather(made.drive).without("engine_load", "throttle", "mass_air_flow")
+    return plain.with_signals(
+        *(wb.Signal(name, time, at(values)) for name, values in signals.items()),
+        wb.Signal("battery_voltage", time, np.full(time.size, METER)),
+    )
+
+
+def at_brakes(truth):
+    """Power that the motor takes in place of the brakes [W]."""
+    return np.minimum(truth.brake_force * truth.speed, 2e4)
+
+
+def test_engine_and_battery_together_weigh_a_power_split(driven):
+    known, loaded = map(split, driven["petrol_dct"])
+    mass, truth = (
+        float(d[0].truth.mass[k]) for d, k in zip(driven["petrol_dct"], (0, -1), strict=True)
+    )
+    car = wb.calibrate(known, mass, vehicle=wb.Vehicle(kind="hybrid"))
+    assert car.torque.source == "hybrid"
+    weighed = wb.weigh(loaded, car)
+    assert weighed.mass == pytest.approx(truth, rel=0.05)
+    assert abs(weighed.mass - truth) < 2.0 * weighed.std
+    assert not any(p.id.startswith("frozen") for p in weighed.problems)
+    assert [w.torque for w in wb.inspect_drive(loaded, car).ways if w.chosen] == ["hybrid"]
+    assert "hybrid" not in {w.torque for w in wb.inspect_drive(loaded).ways}
+    # By the engine alone it would be something else.
+    with refused("hybrid.battery"):
+        wb.calibrate(known, mass, settings=wb.CalibrationSettings(source="measured"))
+
+
+def test_a_hybrid_whose_engine_turns_with_the_wheels_is_refused(driven):
+    made, _ = driven["petrol_dct"][0]
+    geared = split(driven["petrol_dct"][0]).with_signals(made.drive.signals["engine_speed"])
+    with refused("hybrid.geared"):
+        wb.calibrate(geared, 1500.0, vehicle=wb.Vehicle(kind="hybrid"))

@@ -354,6 +354,10 @@ def read_instants(
     if stepless:
         # Wheels that pull turn faster than they roll, which is no gearing.
         gearing = gearing / (1.0 + TYRE_SLIP * np.maximum(rows["specific_force"], 0.0) / GRAVITY)
+    over = source_of(vehicle).over_speed
+    if over is not None:
+        # What is left of a power over a late and rounded speed is the force at the true one.
+        gearing = gearing * over(drive, recorded) / np.where(speed > SLOWEST_GEARED, speed, np.nan)
     changing = shifting(time, gear, margin=SHIFT_MARGIN, ahead=ahead)
     if vehicle.driveline.single_speed:
         changing[:] = False

@@ -29,7 +29,7 @@ from weighbridge.vehicle.classes import VehicleClass
 from weighbridge.vehicle.engine_delay import find_engine_delay, gathered_delay
 from weighbridge.vehicle.gear import GearDetection, detect_gearings, idling, stepless_range
 from weighbridge.vehicle.model import Driveline, Mounting, TorqueModel, Vehicle
-from weighbridge.vehicle.torque import part_of_a_hybrid
+from weighbridge.vehicle.torque import part_of_a_hybrid, sources_of
 from weighbridge.vehicle.torque_sources import TORQUE_SOURCES, TorqueSource
 
 FEWEST_REPORTED: Final = 10
@@ -150,6 +150,8 @@ def problem_of(
         found.append(find_motion(drive, base))
         if progress is not None:
             progress(len(found), len(drives))
+    if source.of_all_motors and _stepless(drives, found, None) is None:
+        raise refused("hybrid.geared", title=source.title)
     motions, squat = _one_squat(found, masses, base.of_class)
     gears, draft = _draft(drives, motions, base, source)
     draft = replace(draft, mounting=_mounting(motions, base.mounting, squat))
@@ -265,7 +267,7 @@ def best_source(drives: Sequence[Drive], vehicle: Vehicle) -> TorqueSource:
     DriveError
         None of them has any.
     """
-    for source in TORQUE_SOURCES.values():
+    for source in (*sources_of(vehicle), *TORQUE_SOURCES.values()):
         if not any(source.lacking(drive) for drive in drives):
             reference = vehicle.torque.reference_torque is not None or all(
                 drive.has("reference_torque") for drive in drives

@@ -53,6 +53,9 @@ IN_GEAR: Final = 1.15
 """Highest over lowest vehicle speed that one engine speed does not outlast in gear [-]."""
 
 
+STANDS: Final = 20.0
+"""Slower than this an engine does not run [rad/s]: engines idle at 50 and more."""
+
 IDLING: Final = 1.25
 """Engine speed over that at standstill below which it may idle on its own [-]."""
 
@@ -83,6 +86,8 @@ def frozen(drive: Drive, name: str) -> Bools:
     shortest = SHORTEST.get(name, SHORTEST_TORQUE)
     least = min(shortest, SHORTEST.get(name, HELD))
     candidates = np.flatnonzero((runs.duration >= least) & (runs.length >= 8)).tolist()
+    if name not in SHORTEST:
+        candidates = [k for k in candidates if not _stands(drive, signal.time[_part(runs, k)])]
     values, counts = np.unique(signal.values[runs.first[candidates]], return_counts=True)
     levels = frozenset(values[counts >= LEVEL_RUNS].tolist())
     impossible = [k for k in candidates if _impossible(drive, signal, _part(runs, k), levels)]
@@ -99,6 +104,13 @@ def frozen(drive: Drive, name: str) -> Bools:
 
 def _part(runs: Runs, k: int) -> slice:
     return slice(int(runs.first[k]), int(runs.first[k] + runs.length[k]))
+
+
+def _stands(drive: Drive, time: Floats) -> bool:
+    """Whether the engine stands meanwhile, as that of a hybrid does: it has no torque then."""
+    engine = _of(drive, "engine_speed", time)
+    known = engine[np.isfinite(engine)]
+    return bool(known.size and np.median(known) < STANDS)
 
 
 def _impossible(drive: Drive, signal: Signal, part: slice, levels: frozenset[float]) -> bool:

@@ -10,6 +10,7 @@ from weighbridge.signals import QUANTITIES, Drive
 from weighbridge.signals.catalogue import IMU_SIGNALS
 from weighbridge.signals.units import scalar_from_si
 from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle.torque import sources_of
 from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
 
 MOTION: Final = frozenset(
@@ -43,7 +44,7 @@ def needed(drive: Drive, vehicle: Vehicle | None) -> frozenset[str]:
 
     The torque is that of the vehicle file; without one, of the source that a calibration takes.
     """
-    sources = [source for source in TORQUE_SOURCES.values() if not source.lacking(drive)]
+    sources = [source for source in sources_of(vehicle) if not source.lacking(drive)]
     if vehicle is not None and vehicle.torque.stated:
         sources = [vehicle.torque.of_source]
     elif len(sources) > 1 and sources[0].needs_reference and not drive.has("reference_torque"):

@@ -37,6 +37,7 @@ from weighbridge.signals.shown import in_html, in_lines, plural
 from weighbridge.signals.units import from_si
 from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.power_balance import find_power_balance
+from weighbridge.vehicle.torque import sources_of
 from weighbridge.vehicle.torque_sources import TORQUE_SOURCES, TorqueSource
 from weighbridge.visible import visible_json
 
@@ -266,7 +267,7 @@ def describe(signal: Signal) -> SignalReport:
 def _ways(drive: Drive, vehicle: Vehicle | None, moves: Excitation) -> tuple[Way, ...]:
     ways = []
     for motion in MOTIONS:
-        for torque in TORQUE_SOURCES.values():
+        for torque in sources_of(vehicle):
             needs = (*_motion_needs(drive, motion), *_torque_needs(drive, torque, vehicle))
             fast = _is_fast(drive, torque)
             made = _made_for(torque, vehicle)

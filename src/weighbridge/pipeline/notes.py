@@ -13,8 +13,7 @@ from weighbridge.messages import Problem, phrase
 from weighbridge.signals import Drive
 from weighbridge.vehicle.data_sheet import needs_calibration, wheel_efficiency
 from weighbridge.vehicle.model import Vehicle
-from weighbridge.vehicle.torque import part_of_a_hybrid, source_of
-from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
+from weighbridge.vehicle.torque import part_of_a_hybrid, source_of, sources_of
 
 
 def uncalibrated(vehicle: Vehicle, result: MassTrack) -> tuple[Problem, ...]:
@@ -192,7 +191,7 @@ def what_is_missing(drive: Drive, vehicle: Vehicle) -> Problem | None:
     if fit is not None and not fit.torque and not vehicle.driveline.gearings:
         return Problem.of("vehicle.no_torque_fit", vehicle=vehicle.name, fit=fit.name)
     names = " and ".join(dict.fromkeys(missing))
-    others = [s for s in TORQUE_SOURCES.values() if s != source and not s.lacking(drive)]
+    others = [s for s in sources_of(vehicle) if s != source and not s.lacking(drive)]
     if others and drive.has("vehicle_speed"):
         if not others[0].signed and not vehicle.provenance.masses:
             return Problem.of(

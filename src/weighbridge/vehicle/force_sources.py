@@ -38,6 +38,12 @@ BATTERY_EFFICIENCY: Final = (0.92, 0.04)
 0.95 is assumed of inverter and motor, near their best, for what is always lost is no part of the
 slope, and 0.97 of gears (`weighbridge.vehicle.data_sheet`). Braking by the motor, its inverse."""
 
+ENGINE_INERTIA: Final = 0.2
+"""Of the engine of a hybrid with its damper and the motor that starts it [kg m^2]."""
+
+SPUN_OVER: Final = 0.2
+"""Half of the time over which its speed changes [s]."""
+
 _AXLES: Final = {
     "front": ("wheel_torque_front", "wheel_torque_fl", "wheel_torque_fr"),
     "rear": ("wheel_torque_rear", "wheel_torque_rl", "wheel_torque_rr"),
@@ -117,6 +123,11 @@ def _speed_of(drive: Drive) -> Signal:
     return speed
 
 
+def _shown_speed(drive: Drive, time: Floats) -> Floats:
+    speed = np.abs(_fresh(_speed_of(drive), time))
+    return np.where(speed >= SLOWEST_POWER, speed, np.nan)
+
+
 def _power_by_speed(drive: Drive, time: Floats, _: TorqueConstants) -> Floats:
     return _per(
         drive.signals["engine_power"].at(time), _fresh(_speed_of(drive), time), SLOWEST_POWER
@@ -154,6 +165,35 @@ def _battery(drive: Drive, time: Floats, _: TorqueConstants) -> Floats:
     force = _per(power, _fresh(_speed_of(drive), time), SLOWEST_POWER)
     efficiency = BATTERY_EFFICIENCY[0]
     return np.asarray(np.where(force >= 0.0, efficiency * force, force / efficiency))
+
+
+def _engine_torque(drive: Drive, time: Floats) -> Floats:
+    """Torque of an engine at stamps (n,) [N m], in percent where it is not recorded as such."""
+    if drive.has("engine_torque"):
+        return _fresh(drive.signals["engine_torque"], time)
+    reference = float(np.median(drive.signals["reference_torque"].values))
+    return reference * _fresh(drive.signals["engine_torque_fraction"], time)
+
+
+def _shared(drive: Drive) -> Signal:
+    """Torque of the engine, on whose clock its power and that of the battery are added [N m]."""
+    name = "engine_torque" if drive.has("engine_torque") else "engine_torque_fraction"
+    time = drive.signals[name].time
+    return Signal("engine_torque", time, _engine_torque(drive, time))
+
+
+def _engine_and_battery(drive: Drive, time: Floats, model: TorqueConstants) -> Floats:
+    """Force of engine and motor of a hybrid (n,) [N].
+
+    The engine spins up apart from the wheels. What that takes is no part of the force.
+    """
+    turning = drive.signals["engine_speed"]
+    speed = _fresh(turning, time)
+    reach = max(turning.period, SPUN_OVER)
+    spun = (turning.at(time + reach) ** 2 - turning.at(time - reach) ** 2) / (4.0 * reach)
+    power = _engine_torque(drive, time) * speed - ENGINE_INERTIA * spun
+    by_engine = _per(power, _fresh(_speed_of(drive), time), SLOWEST_POWER)
+    return np.asarray(by_engine + _battery(drive, time, model))
 
 
 def _per_wheel_angle(radius: float) -> float:
@@ -219,6 +259,7 @@ POWER_BY_SPEED: Final = REPORTED(
     before_motor=True,
     by_radius=False,
     reading=_power_by_speed,
+    over_speed=_shown_speed,
     title="power and vehicle speed",
     words="power of the motor over vehicle speed",
     axis="Force from power [N]",
@@ -239,6 +280,7 @@ BATTERY: Final = REPORTED(
     efficiency=(1.0, BATTERY_EFFICIENCY[1]),
     by_radius=False,
     reading=_battery,
+    over_speed=_shown_speed,
     title="power of the battery",
     words="power of the traction battery over vehicle speed",
     axis="Force from battery power [N]",
@@ -253,3 +295,34 @@ BATTERY: Final = REPORTED(
     expected=1.0,
     limit="what heating, cooling and motor take of the battery's power is not measured",
 )
+
+HYBRID: Final = REPORTED(
+    name="hybrid",
+    signals=("engine_torque", "engine_speed", "battery_current", "battery_voltage",
+             "vehicle_speed"),
+    others=(
+        ("engine_torque", "engine_speed", "battery_current", "battery_voltage", "gnss_speed"),
+        ("engine_torque_fraction", "reference_torque", "engine_speed", "battery_current",
+         "battery_voltage", "vehicle_speed"),
+    ),
+    steady=("battery_voltage", "reference_torque", "engine_speed", "engine_torque",
+            "engine_torque_fraction"),
+    combined=_shared,
+    gearing=_per_distance,
+    before_motor=True,
+    of_all_motors=True,
+    efficiency=(0.95, BATTERY_EFFICIENCY[1]),
+    by_radius=False,
+    reading=_engine_and_battery,
+    over_speed=_shown_speed,
+    title="power of engine and battery",
+    words="power of engine and traction battery over vehicle speed",
+    axis="Force from engine and battery [N]",
+    scale_std=0.04,
+    transfer_std=0.020,
+    between_std=0.045,
+    cold_std=0.03,
+    cold_torque_std=0.02,
+    expected=4.0,
+    limit="what motor and inverter take of the battery's power is not measured",
+)  # fmt: skip

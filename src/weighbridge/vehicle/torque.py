@@ -13,7 +13,7 @@ from weighbridge.messages import Problem, refused
 from weighbridge.signals import Bools, Drive, Floats, Signal
 from weighbridge.vehicle.air import Air
 from weighbridge.vehicle.model import TorqueModel, Vehicle
-from weighbridge.vehicle.torque_sources import TorqueSource
+from weighbridge.vehicle.torque_sources import TORQUE_SOURCES, TorqueSource
 
 DRAGGED_TIME: Final = 0.5
 """Time over which a load shows whether the engine is dragged [s]."""
@@ -57,6 +57,16 @@ def cold_torque_std(vehicle: Vehicle) -> float:
     """Standard deviation of what the cold takes of the torque, over the highest torque [-]."""
     cold = STEPLESS_COLD if vehicle.driveline.stepless else 0.0
     return math.hypot(source_of(vehicle).cold_torque_std, cold)
+
+
+def sources_of(vehicle: Vehicle | None) -> tuple[TorqueSource, ...]:
+    """Sources that read all that drives a vehicle; None is one with one engine or motor."""
+    hybrid = vehicle is not None and vehicle.of_class.motor_helps
+    return tuple(
+        source
+        for source in TORQUE_SOURCES.values()
+        if not (source.of_one_engine if hybrid else source.of_all_motors)
+    )
 
 
 def part_of_a_hybrid(vehicle: Vehicle, source: TorqueSource) -> Problem | None:

@@ -75,6 +75,8 @@ class TorqueSource:
     gearing : angle of the reading's shaft per distance travelled [1/m] by rolling radius [m]: what
         is read behind the gearbox needs none of its gears; None for the engine's shaft
     before_motor : the reading holds what the motor's own inertia takes, where ``gearing`` is given
+    over_speed : of a power over vehicle speed: that speed as recorded (n,) [m/s] at stamps (n,)
+    of_all_motors : the reading holds engine and motor of a hybrid
     efficiency : slope of wheel force over reading where nothing was calibrated, and its standard
         deviation [-]; None for that of the driveline
     by_radius : the force depends on the rolling radius
@@ -114,6 +116,8 @@ class TorqueSource:
     combined: Callable[[Drive], Signal] | None = None
     gearing: Callable[[float], float] | None = None
     before_motor: bool = False
+    over_speed: Callable[[Drive, Floats], Floats] | None = None
+    of_all_motors: bool = False
     efficiency: tuple[float, float] | None = None
     by_radius: bool = True
     refusal: Callable[[Drive, str | None], Problem | None] = _no_refusal
@@ -141,7 +145,7 @@ class TorqueSource:
     @property
     def of_one_engine(self) -> bool:
         """Whether it reads one engine or motor, before what a second one adds."""
-        return self.gearing is None or self.before_motor
+        return (self.gearing is None or self.before_motor) and not self.of_all_motors
 
     def between(self, *, single_speed: bool) -> float:
         """Scatter of masses from drive to drive by the reading, relative [-].

@@ -16,6 +16,7 @@ from weighbridge.registry import Registry
 from weighbridge.signals import Drive, Floats, Signal
 from weighbridge.vehicle.force_sources import (
     BATTERY,
+    HYBRID,
     POWER,
     POWER_BY_SPEED,
     TRACTION_FORCE,
@@ -208,6 +209,7 @@ TORQUE_SOURCES: Final = Registry(
         _LOAD,
         _AIR_FLOW,
         BATTERY,
+        HYBRID,
     ),
 )
 """Every torque source, the most direct first.
