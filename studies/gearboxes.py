@@ -69,7 +69,7 @@ def _second(
     yield wb.Vehicle(kind=base or heavy.get(vehicle.kind, "car")), made
 
 
-def _own(kind: str, seed: int) -> Iterator[tuple[wb.Vehicle, list[Made]]]:
+def _own(kind: str, seed: int, base: str | None = None) -> Iterator[tuple[wb.Vehicle, list[Made]]]:
     rng = np.random.default_rng([seed, 46])
     car = own_vehicle(rng, kind)
     made = []
@@ -83,7 +83,7 @@ def _own(kind: str, seed: int) -> Iterator[tuple[wb.Vehicle, list[Made]]]:
         seen = without_weather(drive.drive)
         seen = replace(seen, info=replace(seen.info, mass=None, vehicle=None))
         made.append((seen, float(drive.truth.mass[0]), float(drive.truth.mass[-1])))
-    yield bare(car), made
+    yield replace(bare(car), kind=base or car.kind), made
 
 
 PLAIN: Final = Logger()
@@ -109,6 +109,9 @@ KINDS: Final[dict[str, Callable[[int], Iterator[tuple[wb.Vehicle, list[Made]]]]]
     "power split, battery recorded": lambda seed: _second("power_split", BATTERY, seed),
     "power split, battery and torque recorded, class stated": lambda seed: _second(
         "power_split", BOTH, seed, "hybrid"
+    ),
+    "power split, own, battery and torque recorded, class stated": lambda seed: _own(
+        "petrol_hybrid", seed, "hybrid"
     ),
     "parallel hybrid": lambda seed: _second("parallel_hybrid", PLAIN, seed),
     "parallel hybrid, battery recorded": lambda seed: _second("parallel_hybrid", BATTERY, seed),

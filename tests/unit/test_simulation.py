@@ -5,6 +5,7 @@ import numpy as np
 import polars as pl
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from scipy.ndimage import uniform_filter1d
 from tests.noted import error
 
 from weighbridge import ConfigError, read_drive
@@ -35,6 +36,7 @@ from weighbridge.simulation import (
     simulate_car,
     usual_polling,
 )
+from weighbridge.simulation.vehicles import POWER_SPLIT, STEPLESS
 
 
 def short(seed=5, duration=80.0, **changes):
@@ -593,6 +595,7 @@ def test_squat_of_a_van_grows_with_its_load():
         ("petrol_manual", "car"),
         ("petrol_dct", "car"),
         ("petrol_cvt", "car"),
+        ("petrol_hybrid", "car"),
         ("diesel_automatic", "car"),
         ("electric", "car"),
         ("van", "van"),
@@ -608,9 +611,37 @@ def test_random_vehicles_of_every_kind_drive(kind, vehicle_class):
         truth = simulate_car(short(car=car, sensors=Sensors(imu_rate=0.0, gnss_rate=0.0))).truth
         assert truth.speed.max() > 6.0
     if kind.startswith("petrol"):
-        boxes = {"manual": "manual", "dct": "dual_clutch", "cvt": "stepless"}
+        boxes = {"manual": "manual", "dct": "dual_clutch", "cvt": "stepless", "hybrid": "stepless"}
         wanted = boxes[kind.removeprefix("petrol_")]
         assert {car.transmission for car in drawn} == {wanted}
+
+
+def test_a_power_split_moves_as_without_its_motor_and_loses_no_power():
+    whole = short(duration=400.0, polling=usual_polling(POWER_SPLIT), car=POWER_SPLIT)
+    made = simulate_car(whole)
+    plain = simulate_car(
+        replace(whole, car=replace(POWER_SPLIT, split=None), polling=usual_polling(STEPLESS))
+    )
+    truth, split, drive = made.truth, POWER_SPLIT.split, made.drive
+    assert_array_equal(truth.speed, plain.truth.speed)
+    assert_array_equal(truth.traction_force, plain.truth.traction_force)
+    moving = truth.speed > 3.0
+    stands = moving & (truth.engine_speed < 20.0)
+    assert 0.05 < np.mean(stands) / np.mean(moving) < 0.95
+    assert np.all(truth.engine_torque[stands & (truth.engine_speed == 0.0)] == 0.0)
+    # What the wheels get is what engine and battery give, less the losses that were asked for.
+    battery = drive.signals["battery_voltage"], drive.signals["battery_current"]
+    given = np.nan_to_num(battery[0].at(truth.time) * battery[1].at(truth.time)) - split.auxiliary
+    spun = split.engine_inertia * np.gradient(truth.engine_speed, truth.time)
+    engine = (truth.engine_torque - spun) * truth.engine_speed
+    electric = np.where(given > 0.0, given * split.efficiency, given / split.efficiency)
+    braked = (plain.truth.brake_force - truth.brake_force) * np.maximum(truth.speed, 3.0)
+    wheels = truth.traction_force * truth.speed / split.mechanical - braked
+    steady = uniform_filter1d(wheels, 101)[moving], uniform_filter1d(engine + electric, 101)[moving]
+    assert_allclose(*steady, atol=0.03 * np.abs(wheels).max())
+    assert np.corrcoef(*steady)[0, 1] > 0.995
+    with pytest.raises(ConfigError, match="battery_voltage"):
+        simulate_car(short(polling=usual_polling(POWER_SPLIT)))
 
 
 def test_named_vehicles_lack_what_random_ones_have():

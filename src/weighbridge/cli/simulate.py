@@ -23,9 +23,9 @@ def simulate(
         typer.Argument(
             help="car, car-calibration, car-short, car-loading, highway, compact, "
             "compact-calibration, electric, bus, bus-urban, bus-calibration, diesel, "
-            "diesel-calibration, cvt, cvt-calibration, van, van-calibration, truck, "
-            "truck-calibration or ride; fleet has options of its own: weighbridge simulate fleet "
-            "--help.",
+            "diesel-calibration, cvt, cvt-calibration, hybrid, hybrid-calibration, van, "
+            "van-calibration, truck, truck-calibration or ride; fleet has options of its own: "
+            "weighbridge simulate fleet --help.",
             autocompletion=scenario_names,
             show_default=False,
         ),

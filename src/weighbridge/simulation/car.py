@@ -15,6 +15,35 @@ RPM = math.pi / 30.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class PowerSplit:
+    """Who gives what in a power split.
+
+    Attributes
+    ----------
+    start_power : asked for, from which the engine runs [W]
+    motor_power : largest of the motor, driving and braking [W]
+    efficiency : of motor and inverter, one way [-]
+    mechanical : of gears between both and the wheels [-]
+    slowest, fastest : engine speed at no power and at the engine's largest [rad/s]
+    engine_power : the engine's largest [W]
+    engine_inertia : [kg m^2]
+    auxiliary : power of the battery beside driving [W]
+    voltage : of the battery at rest [V]
+    """
+
+    start_power: float = 7000.0
+    motor_power: float = 50_000.0
+    efficiency: float = 0.90
+    mechanical: float = 0.96
+    slowest: float = 105.0
+    fastest: float = 420.0
+    engine_power: float = 70_000.0
+    engine_inertia: float = 0.17
+    auxiliary: float = 450.0
+    voltage: float = 210.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class SimulatedCar:
     """The physics of one car, van, truck or bus.
 
@@ -93,6 +122,7 @@ class SimulatedCar:
     tyre_slip : wheel slip per traction over weight [-]
     side_slip : slip angle of the rear axle per lateral acceleration [rad per m/s^2]
     cylinders : of a four-stroke engine; 0 for a motor
+    split : of a hybrid, whose engine turns apart from the wheels; None without a motor beside it
 
     Notes
     -----
@@ -174,6 +204,7 @@ class SimulatedCar:
     tyre_slip: float = 0.035
     side_slip: float = 0.0035
     cylinders: int = 4
+    split: PowerSplit | None = None
 
     def __post_init__(self) -> None:
         for name in ("mass", "final_drive", "wheel_radius", "max_speed", "torque_lag"):

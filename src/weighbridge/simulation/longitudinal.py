@@ -59,6 +59,7 @@ class Trajectory(NamedTuple):
     loaded: Floats  # since the start [kg]
     brake_pedal: Floats  # 1 while it is pressed [-]
     uncut: Floats  # part of the charge of overrun that still burns [-]
+    battery_power: Floats | None = None  # that it gives, of a hybrid [W]
 
 
 def _shelter(scenario: Scenario, rng: np.random.Generator) -> tuple[Floats, Floats]:

@@ -20,7 +20,14 @@ from weighbridge.simulation.route import (
     straight_route,
 )
 from weighbridge.simulation.scenario import Braking, Effects, Loading, Polling, Scenario, Sensors
-from weighbridge.simulation.vehicles import BUS, DIESEL_AUTOMATIC, STEPLESS, TRUCK18, VAN
+from weighbridge.simulation.vehicles import (
+    BUS,
+    DIESEL_AUTOMATIC,
+    POWER_SPLIT,
+    STEPLESS,
+    TRUCK18,
+    VAN,
+)
 
 Maker = Callable[[float, int], Scenario]
 """Makes a scenario from payload [kg] and seed."""
@@ -124,6 +131,11 @@ TORQUE_POLLING: Final = Polling(
 )
 """Of a vehicle that sends its engine's torque in percent by OBD."""
 
+_HYBRID_POLLING: Final = Polling(
+    fast=("vehicle_speed", "engine_speed", "engine_torque", "battery_voltage", "battery_current"),
+    rate=4.0,
+)
+
 _DIESEL_POLLING: Final = Polling(
     fast=("vehicle_speed", "engine_speed", "engine_load", "throttle"), rate=5.0
 )
@@ -139,13 +151,16 @@ def usual_polling(car: SimulatedCar) -> Polling:
     Returns
     -------
     Polling
-        J1939 for bus and truck, motor torque for an electric car, torque percent for a stepless
-        box, calculated load (with air flow for petrol) for the others.
+        J1939 for bus and truck, motor torque for an electric car, engine torque and battery for a
+        hybrid, torque percent for a stepless box, calculated load (with air flow for petrol) for
+        the others.
     """
     if car.kind in ("bus", "truck"):
         return _TRUCK_POLLING
     if car.electric:
         return _ELECTRIC_POLLING
+    if car.split is not None:
+        return _HYBRID_POLLING
     if car.transmission == "stepless":
         return TORQUE_POLLING
     return _DIESEL_POLLING if car.engine == "diesel" else Polling()
@@ -234,6 +249,8 @@ SCENARIOS: Final[dict[str, Maker]] = {
     "diesel-calibration": _calibrating("diesel-calibration", DIESEL_AUTOMATIC, 15),
     "cvt": _on_the_road("cvt", STEPLESS, 20),
     "cvt-calibration": _calibrating("cvt-calibration", STEPLESS, 21),
+    "hybrid": _on_the_road("hybrid", POWER_SPLIT, 22),
+    "hybrid-calibration": _calibrating("hybrid-calibration", POWER_SPLIT, 23),
     "van": _on_the_road("van", VAN, 16),
     "van-calibration": _calibrating("van-calibration", VAN, 17),
     "truck": _on_the_road("truck", TRUCK18, 18),
@@ -257,6 +274,8 @@ ABOUT: Final[dict[str, str]] = {
     "diesel-calibration": "the diesel car in all gears, loads and engine speeds",
     "cvt": "petrol car with a stepless gearbox that sends its engine's torque, about 75 min",
     "cvt-calibration": "the same car at all loads and engine speeds",
+    "hybrid": "petrol hybrid (power split) that sends engine torque, battery voltage and current",
+    "hybrid-calibration": "the same car at all loads",
     "van": "diesel van with a manual gearbox, 2100 kg empty to 3500 kg, about 80 min",
     "van-calibration": "the van in all gears, loads and engine speeds",
     "truck": "rigid truck of 18 t, 9000 kg empty, J1939, about 95 min",

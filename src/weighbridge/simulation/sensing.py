@@ -17,9 +17,11 @@ from weighbridge.constants import (
     STANDARD_TEMPERATURE,
     TEMPERATURE_LAPSE,
 )
+from weighbridge.errors import ConfigError
 from weighbridge.kernels.simulated_driveline import DRIVING
 from weighbridge.signals import QUANTITIES, Floats, Signal
 from weighbridge.signals.units import scalar_to_si
+from weighbridge.simulation.hybrid import volts_and_amps
 from weighbridge.simulation.longitudinal import DT
 
 if TYPE_CHECKING:
@@ -373,6 +375,11 @@ def _values(scenario: Scenario, drive: Trajectory, name: str, pose: Pose) -> tup
         return (touched | held).astype(np.float64), 1.0
     if name == "clutch_switch":
         return (drive.phase != DRIVING).astype(np.float64), 1.0
+    if name in ("battery_voltage", "battery_current"):
+        if car.split is None or drive.battery_power is None:
+            raise ConfigError(f"{name} can be polled of a hybrid only, not of {car.name!r}")
+        volts, amps = volts_and_amps(drive.battery_power, car.split)
+        return (volts, 0.5) if name == "battery_voltage" else (amps, 0.1)
     raise KeyError(name)
 
 
@@ -380,7 +387,7 @@ POLLABLE = (
     "vehicle_speed", "engine_speed", "engine_load", "engine_torque", "engine_torque_fraction",
     "reference_torque", "mass_air_flow", "lambda_1", "throttle", "ambient_temperature",
     "barometric_pressure", "gear", "brake_switch", "clutch_switch", "retarder_torque",
-    "fuel_rate",
+    "fuel_rate", "battery_voltage", "battery_current",
 )  # fmt: skip
 """Quantities the simulated control units can be asked for."""
 

@@ -17,6 +17,7 @@ from weighbridge.io.write import TableFormat, write_drive
 from weighbridge.signals import Drive, DriveInfo, Floats, Signal
 from weighbridge.signals.units import from_si
 from weighbridge.simulation.body import Pose, simulate_pose
+from weighbridge.simulation.hybrid import shared
 from weighbridge.simulation.longitudinal import DT, Trajectory, simulate_trajectory
 from weighbridge.simulation.scenario import Scenario, streams
 from weighbridge.simulation.sensing import (
@@ -174,6 +175,8 @@ def simulate_car(
     tell = progress or (lambda done, total: None)
     random = streams(scenario.seed, "plan", "drive", "road", "imu", "gnss", "obd", "habits")
     trajectory = simulate_trajectory(scenario, random["plan"], random["drive"], random["habits"])
+    if scenario.car.split is not None:
+        trajectory = shared(trajectory, scenario.car.split)
     tell(4, 8)
     pose = simulate_pose(scenario, trajectory, random["road"])
     tell(5, 8)

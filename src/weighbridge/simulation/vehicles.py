@@ -10,13 +10,21 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from weighbridge.arguments import check_choice
-from weighbridge.simulation.car import ELECTRIC, RPM, SimulatedCar, random_car, rpm
+from weighbridge.simulation.car import (
+    ELECTRIC,
+    RPM,
+    PowerSplit,
+    SimulatedCar,
+    random_car,
+    rpm,
+)
 from weighbridge.simulation.scenario import Habits
 
 VehicleKind = Literal[
     "petrol_manual",
     "petrol_dct",
     "petrol_cvt",
+    "petrol_hybrid",
     "diesel_automatic",
     "electric",
     "van",
@@ -108,6 +116,11 @@ STEPLESS: Final = SimulatedCar(
 converter, of ratios 2.6 to 0.4 as such boxes have. The belt and its pump lose 8 to 20 % of the
 power, least near a ratio of one (Srivastava and Haque, A review on belt and chain continuously
 variable transmissions, Mechanism and Machine Theory 44, 2009)."""
+
+POWER_SPLIT: Final = replace(
+    STEPLESS, name="petrol hybrid, power split", mass=1420.0, split=PowerSplit()
+)
+"""A hybrid that moves as the car with a stepless gearbox does: who gives the power is another."""
 
 VAN: Final = SimulatedCar(
     name="diesel van, 6-speed manual",
@@ -312,8 +325,10 @@ def random_vehicle(rng: np.random.Generator, kind: VehicleKind) -> SimulatedCar:
             car = random_car(rng)
             if car.transmission == wanted:
                 return with_random_details(details, car)
-    if kind == "petrol_cvt":
-        return with_random_ratios(details, with_random_details(details, _vary(rng, STEPLESS)))
+    if kind in ("petrol_cvt", "petrol_hybrid"):
+        base = STEPLESS if kind == "petrol_cvt" else POWER_SPLIT
+        car = with_random_ratios(details, with_random_details(details, _vary(rng, base)))
+        return car if car.split is None else replace(car, split=_random_split(details))
     model = {
         "diesel_automatic": DIESEL_AUTOMATIC, "electric": ELECTRIC, "van": VAN, "truck": TRUCK18,
         "bus": BUS,
@@ -404,6 +419,26 @@ def with_random_ratios(rng: np.random.Generator, car: SimulatedCar) -> Simulated
         pump=between(0.002, 0.02),
         loss_constant=between(1.0, 6.0),
         loss_slope=between(0.03, 0.1),
+    )
+
+
+def _random_split(rng: np.random.Generator) -> PowerSplit:
+    """Draw how a hybrid shares its power, and what its motor loses."""
+
+    def between(low: float, high: float) -> float:
+        return float(rng.uniform(low, high))
+
+    return PowerSplit(
+        start_power=between(4e3, 14e3),
+        motor_power=between(35e3, 70e3),
+        efficiency=between(0.84, 0.94),
+        mechanical=between(0.93, 0.97),
+        slowest=between(95.0, 130.0),
+        fastest=between(350.0, 500.0),
+        engine_power=between(60e3, 90e3),
+        engine_inertia=between(0.12, 0.24),
+        auxiliary=between(250.0, 900.0),
+        voltage=between(180.0, 340.0),
     )
 
 
