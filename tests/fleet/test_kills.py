@@ -109,6 +109,7 @@ def rows_there(results: Path) -> int:
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(3600)
 @pytest.mark.skipif(not KILLS, reason="takes minutes: WEIGHBRIDGE_KILLS=50 says how many kills")
 def test_kills_at_random_points_lose_and_double_nothing(cluster, tmp_path):
     """Scheduler, worker or command is killed at a random point, and the command given again."""
