@@ -10,6 +10,7 @@ PAGES = {
     "live": "docs/live_figures.md",
     "fleet_scale": "studies/fleet_scale.md",
     "gearboxes": "studies/gearboxes.md",
+    "kerb": "studies/kerb.md",
     "truck_fleet": "studies/truck_fleet.md",
 }
 

@@ -19,6 +19,7 @@ from weighbridge.live.alerts import Alert
 from weighbridge.live.outputs.lines import json_line
 from weighbridge.live.outputs.mqtt import Mqtt, Topics, parse_broker, slug
 from weighbridge.live.outputs.outbox import Outbox
+from weighbridge.live.weighing import KerbState
 
 amqtt_broker = pytest.importorskip("amqtt.broker", reason="amqtt is not installed")
 from amqtt.plugins.base import BasePlugin  # noqa: E402
@@ -174,8 +175,10 @@ def test_home_assistant_is_told_of_one_device_in_one_message(tmp_path):
         "below",
     ]
     shown = {k: e for k, e in entities.items() if "value_template" in e}
-    assert list(shown) == ["mass", "std", "payload", "status", "progress", "overload", "parked"]
-    assert len({e["unique_id"] for e in shown.values()}) == 7
+    assert list(shown) == [
+        "mass", "std", "payload", "status", "progress", "overload", "kerb_change", "parked"
+    ]  # fmt: skip
+    assert len({e["unique_id"] for e in shown.values()}) == 8
     for entity in shown.values():
         assert entity["p"] in ("sensor", "binary_sensor")
         assert entity["state_topic"] == TOPIC
@@ -194,14 +197,13 @@ def test_the_templates_of_home_assistant_fit_a_weighing(tmp_path):
 
     alert = Alert(2050.0)
     alert.look(weighing())
-    w = weighing(alerts=(alert.state(weighing()),), parked=True)
-    assert [shown(k, w) for k in ("mass", "status", "parked", "progress")] == [
-        "2100.0", "weighed", "ON", "100.0"
-    ]  # fmt: skip
+    w = weighing(
+        alerts=(alert.state(weighing()),), parked=True, kerb=KerbState(change=210.0, std=50.0)
+    )
+    keys = ("mass", "status", "parked", "progress", "kerb_change")
+    assert [shown(k, w) for k in keys] == ["2100.0", "weighed", "ON", "100.0", "210.0"]
     first = next(iter(drive(1)))
-    assert [shown(k, first) for k in ("mass", "status", "parked", "progress")] == [
-        "None", "learning", "OFF", "None"
-    ]  # fmt: skip
+    assert [shown(k, first) for k in keys] == ["None", "learning", "OFF", "None", "None"]
     assert json.loads(shown("status", w, "json_attributes_template"))["advice"] == w.advice
     assert entities["above"]["device_class"] == "problem"
     assert [shown("above", told) for told in (w, replace(w, alerts=()))] == ["ON", "OFF"]

@@ -50,8 +50,9 @@ class Keeper:
 
         A checkpoint that cannot be used is set aside beside it, under a name that ends in
         ``.bad``. Of one that is older than the samples by more than `OLDEST`, what was set to
-        nought is taken over, and nothing else; likewise of one that is later, unless the host's
-        clock was set back: then it is gone on from, behind its newest sample.
+        nought and how the vehicle tilts is taken over, and nothing else; likewise of one that is
+        later, unless the host's clock was set back: then it is gone on from, behind its newest
+        sample.
 
         Parameters
         ----------
@@ -78,7 +79,7 @@ class Keeper:
             scale.clock_set_back(start)
             return scale, f"{self.path}: {_set_back(scale.newest, start)}"
         if not -_AHEAD <= after <= OLDEST and math.isfinite(after):
-            new.take_tare(scale)
+            new.take_over(scale)
             return new, f"{self.path}: {self._of_another_time(scale.newest, start)}"
         reported = scale.weighing()
         if reported.mass != reported.mass:

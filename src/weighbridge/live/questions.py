@@ -8,6 +8,7 @@ from typing import Final
 from weighbridge.estimators.judging import STOP
 from weighbridge.live.on_the_move import FIRST
 from weighbridge.live.records import Records
+from weighbridge.live.weighing import KerbState
 from weighbridge.messages import Problem, phrase
 from weighbridge.report.text import duration
 from weighbridge.signals.catalogue import IMU_SIGNALS
@@ -71,3 +72,12 @@ def doubts(
         times = phrase("once") if jumps == 1 else phrase("times_in_all", count=jumps)
         found.append(Problem.of("live.clock_jumps", times=times, by=records.offset))
     return tuple(found)
+
+
+def by_tilt(kerb: KerbState) -> tuple[Problem, ...]:
+    """Say that the load has changed, where the tilt of the parked vehicle shows it."""
+    if not math.isfinite(kerb.change):
+        return ()
+    low, high = kerb.interval
+    change = f"{kerb.change:+.0f}"
+    return (Problem.of("live.by_tilt", change=change, low=low, high=high),)

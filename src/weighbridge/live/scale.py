@@ -16,15 +16,17 @@ from weighbridge.estimators.judging import STOP
 from weighbridge.live.arrival import health_of, is_parked, needed_signals
 from weighbridge.live.checkpoint import packed, refuse_absurd, unpacked
 from weighbridge.live.clock import pace
+from weighbridge.live.kerb import Kerb, Weighed, stands
 from weighbridge.live.learning import LONGEST, Learned, known_mass
 from weighbridge.live.looking import Look, Step
 from weighbridge.live.on_the_move import FIRST, OnTheMove, moves
 from weighbridge.live.outlook import Outlook, outlook
-from weighbridge.live.questions import doubts, of_before
+from weighbridge.live.questions import by_tilt, doubts, of_before
 from weighbridge.live.records import LATENESS, Records
 from weighbridge.live.source import Samples
 from weighbridge.live.weighing import LiveStatus, LiveWeighing, SignalHealth
 from weighbridge.messages import Problem, phrase
+from weighbridge.navigation.forward import forward_axis
 from weighbridge.pipeline import forward
 from weighbridge.pipeline.forward import ForwardSetup, ForwardState
 from weighbridge.pipeline.given import GivenVehicle, as_vehicle
@@ -101,6 +103,7 @@ class LiveScale:
         self._learned: Learned | None = None
         self._next: float | None = None
         self._move = OnTheMove()
+        self._kerb = Kerb()
         self._since = self._kept_from = -math.inf
         self._tared: float | None = None
         self._anew = -math.inf
@@ -185,6 +188,7 @@ class LiveScale:
             "next": self._next,
             "driven": self._move.driven,
             "driven_this_load": self._move.this_load,
+            "kerb": self._kerb,
             "since": self._since,
             "tared": self._tared,
             "learns": self._learns,
@@ -221,6 +225,7 @@ class LiveScale:
             scale._setup, scale._state = content["setup"], content["state"]
             scale._next, scale._learned = content["next"], content["learned"]
             scale._move = OnTheMove(content["driven"], content["driven_this_load"])
+            scale._kerb = content["kerb"]
             scale._since, scale._tared = content["since"], content["tared"]
             scale._learns, scale.kept_at = content["learns"], content["pace"]
             scale._records.add_block(content["samples"])
@@ -257,9 +262,10 @@ class LiveScale:
         self._tared = mass
         return mass
 
-    def take_tare(self, other: LiveScale) -> None:
-        """Set to nought what another scale of the vehicle has set to nought."""
+    def take_over(self, other: LiveScale) -> None:
+        """Take over what holds for any load: what was set to nought, and how the vehicle tilts."""
         self._tared = other._tared
+        self._kerb.map = other._kerb.map
 
     def clock_set_back(self, start: float) -> None:
         """Put samples from an earlier instant on [s] behind the newest, as after a stop."""
@@ -292,6 +298,7 @@ class LiveScale:
         self._take(wait=True)
         self._learned = None
         self._move = OnTheMove()
+        self._kerb.begin_anew()
         self._since = self._kept_from = self._anew = records.resumed
         if self._learns:
             self._setup = self._state = None
@@ -320,7 +327,7 @@ class LiveScale:
         parked, health = self._health(silence)
         found = self._outlook(mass, std, floor, health, state, parked=parked)
         newest = self._records.newest
-        learned = self._learned
+        learned, kerb = self._learned, self._kerb.state()
         return LiveWeighing(
             vehicle=self.vehicle.name,
             time=at,
@@ -343,8 +350,13 @@ class LiveScale:
             advice=found.advice,
             look=self._look(state),
             provisional=state is not self._state,
+            kerb=kerb,
             signals=health,
-            problems=(*self._doubts(mass), *(learned.problems if learned is not None else ())),
+            problems=(
+                *self._doubts(mass),
+                *by_tilt(kerb),
+                *(learned.problems if learned is not None else ()),
+            ),
         )
 
     def _doubts(self, mass: float) -> tuple[Problem, ...]:
@@ -465,11 +477,16 @@ class LiveScale:
         drive = self._records.drive("live", self.info)
         seen = recent(drive, until, length)
         moved = moves(seen, until)
+        still = stands(seen, until)
+        if not still and self._kerb.stand is not None:
+            # The mass of the stop is that of a look that goes on, if one does.
+            self._take(wait=True)
         if until - length <= self._records.resumed < until:
             self._move.before = self._move.driven
         self._move.go_on(length, moved=moved)
         if self._setup is not None and self._state is not None:
             self._state, _ = forward.step(self._state, seen, until, self._setup)
+        self._tilt(seen, until, length, still=still)
         if self._looking is not None:
             self._looking.steps.append(Step(until, seen, length if moved else 0.0))
         keep = BEHIND + 2.0 * self._every
@@ -478,6 +495,22 @@ class LiveScale:
             if self._move.is_due:
                 self._learn(drive, until)
         self._forget(until - keep)
+
+    def _tilt(self, seen: Drive, until: float, length: float, *, still: bool) -> None:
+        """Follow the tilt of the vehicle while it stands."""
+        state, setup = self._state, self._setup
+        axis = None
+        if state is not None and setup is not None:
+            axis = forward_axis(state.motion, setup.navigation)
+        if not still:
+            self._kerb.move(length, axis)
+            return
+        weighed = None
+        if self._goes_on() and self._looking is None:
+            mass, std, floor, _ = known_mass(state, setup, self._learned)
+            if math.isfinite(mass):
+                weighed = Weighed(mass, max(std**2 - (floor * mass) ** 2, 0.0))
+        self._kerb.stay(seen, until, length, forward=axis, mass=weighed)
 
     def _forget(self, before: float) -> None:
         self._kept_from = max(self._kept_from, before)

@@ -90,6 +90,40 @@ class AlertState:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class KerbState:
+    """What the tilt of the parked vehicle shows.
+
+    Attributes
+    ----------
+    follows : the tilt follows the load; None while too few changes of load were weighed
+    weighed : changes of load that the motion has weighed, by which it is learnt
+    change, std : of the load since the vehicle stands [kg]; NaN where none is sure
+    """
+
+    follows: bool | None = None
+    weighed: int = 0
+    change: float = math.nan
+    std: float = math.nan
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Interval that holds the change with 95 % probability [kg]."""
+        half = float(ndtri(0.975)) * self.std
+        return self.change - half, self.change + half
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what is written as JSON."""
+        known = math.isfinite(self.change)
+        return {
+            "status": {None: "learning", True: "watching", False: "blind"}[self.follows],
+            "weighed_changes": self.weighed,
+            "change_kg": _known(self.change),
+            "std_kg": _known(self.std),
+            "interval95_kg": list(self.interval) if known else None,
+        }
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class LiveWeighing(Explained):
     """The mass at one moment of a drive, its uncertainty, and what would reduce it.
 
@@ -119,6 +153,7 @@ class LiveWeighing(Explained):
         the mass does not wait for the next one
     provisional : the mass counts samples among which others may still come; the next one is made
         anew from the settled state
+    kerb : what the tilt shows while the vehicle is parked
     alerts : limits that are watched, by the settled mass
     signals : health of each
     problems : what was found and what is uncertain
@@ -145,6 +180,7 @@ class LiveWeighing(Explained):
     reach: float = math.nan
     look: float = math.nan
     provisional: bool = False
+    kerb: KerbState = KerbState()
     alerts: tuple[AlertState, ...] = ()
     signals: tuple[SignalHealth, ...] = ()
     problems: tuple[Problem, ...] = ()
@@ -215,6 +251,7 @@ class LiveWeighing(Explained):
                 }
                 for a in self.alerts
             ],
+            "kerb": self.kerb.to_dict(),
             "driven_s": self.driven,
             "progress": self.progress,
             "progress_to_5": _known(self.progress_to_5),

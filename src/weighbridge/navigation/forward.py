@@ -243,6 +243,13 @@ def _laid_out(
     return state._replace(motion=motion, row=ends[0], level=level), rows
 
 
+def forward_axis(state: NavigationState, setup: Setup) -> Floats:
+    """Forward axis of the vehicle in sensor axes (3,), as the mounting is known now."""
+    x = state.filter.x
+    turn = euler_to_matrix(0.0, float(x[PITCH0]), -float(x[YAW0]))
+    return np.asarray((turn @ setup.rot_bs)[0])
+
+
 def joined(parts: list[Motion], last: int | None = None) -> Motion:
     """Put successive rows together, the ``last`` of them if so many are asked for."""
     keep = slice(None if last is None else -last, None)

@@ -188,6 +188,13 @@ class Topics:
                 _percent_of("overload_probability"),
                 part,
             ),
+            (
+                "sensor",
+                "kerb_change",
+                "Change of load by tilt",
+                "{{ value_json.kerb.change_kg }}",
+                weight,
+            ),
             ("binary_sensor", "parked", "Parked", _ON_OR_OFF.format("value_json.parked"), {}),
         ]
         for side in _SIDES:

@@ -6,12 +6,17 @@ import math
 
 from weighbridge.live.weighing import LiveStatus, LiveWeighing
 
-News = tuple[LiveStatus, bool, tuple[bool, ...]]
+News = tuple[LiveStatus, bool, bool, tuple[bool, ...]]
 
 
 def news(weighing: LiveWeighing) -> News:
-    """Return what is reported at once where it changes: status, parked or not, alerts."""
-    return weighing.status, weighing.parked, tuple(alert.active for alert in weighing.alerts)
+    """Return what is reported at once where it changes.
+
+    That is the status, parked or not, whether the tilt shows a change of load, and alerts.
+    """
+    tilts = math.isfinite(weighing.kerb.change)
+    alerts = tuple(alert.active for alert in weighing.alerts)
+    return weighing.status, weighing.parked, tilts, alerts
 
 
 def due(weighing: LiveWeighing, last: float, period: float) -> bool:
