@@ -460,6 +460,22 @@ def test_files_of_something_else_are_no_outbox(tmp_path):
         Outbox(tmp_path)
 
 
+def test_what_was_taken_is_not_sent_again_where_the_disk_is_full(tmp_path):
+    box = Outbox(tmp_path / "box")
+    box.put([("t", bytes([k])) for k in range(4)])
+    box._database.execute("PRAGMA query_only = 1")
+    box.remove([1, 2])
+    assert [m.number for m in box.after(0, 1)] == [3]
+    assert len(box) == 2
+    box._database.execute("PRAGMA query_only = 0")
+    box.remove([3])
+    assert len(box) == 1
+    box.close()
+    again = Outbox(tmp_path / "box")
+    assert [m.payload for m in again.after(0, 9)] == [bytes([3])]
+    again.close()
+
+
 def test_a_full_disk_is_told_and_weighing_goes_on(tmp_path):
     box = Outbox(tmp_path / "box")
     pages = box._database.execute("PRAGMA page_count").fetchone()[0]

@@ -409,7 +409,7 @@ class _Session:
         Raises
         ------
         sqlite3.Error
-            The disk is full or gone.
+            The outbox cannot be read.
         """
         newest = 0
         until = float("inf")

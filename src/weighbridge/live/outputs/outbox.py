@@ -65,6 +65,7 @@ class Outbox:
         self.dropped = 0
         self._most = most
         self._lock = Lock()
+        self._removed: set[int] = set()
         try:
             self._database = self._opened()
         except sqlite3.OperationalError as error:
@@ -75,7 +76,7 @@ class Outbox:
         self._count = int(self._database.execute("SELECT count(*) FROM messages").fetchone()[0])
 
     def __len__(self) -> int:
-        return self._count
+        return self._count - len(self._removed)
 
     def put(self, messages: list[tuple[str, bytes]]) -> None:
         """Append messages, given as topic and payload.
@@ -86,6 +87,7 @@ class Outbox:
             The disk is full or gone; none of them was taken.
         """
         with self._lock:
+            self._remove()
             over = max(self._count + len(messages) - self._most, 0)
             try:
                 with self._database as d:
@@ -116,23 +118,29 @@ class Outbox:
             rows = self._database.execute(
                 "SELECT number, topic, payload FROM messages WHERE number > ? "
                 "ORDER BY number LIMIT ?",
-                (number, most),
+                (number, most + len(self._removed)),
             )
-            return [Message(*row) for row in rows]
+            left = [Message(*row) for row in rows if row[0] not in self._removed]
+            return left[:most]
 
     def remove(self, numbers: list[int]) -> None:
-        """Remove messages that were taken.
+        """Remove messages that were taken; where the disk is full, when it has room again."""
+        with self._lock:
+            self._removed.update(numbers)
+            self._remove()
 
-        Raises
-        ------
-        sqlite3.Error
-            The disk is full or gone; they will be sent again.
-        """
-        with self._lock, self._database as d:
-            removed = d.executemany(
-                "DELETE FROM messages WHERE number = ?", [(n,) for n in numbers]
-            )
-            self._count -= removed.rowcount
+    def _remove(self) -> None:
+        if not self._removed:
+            return
+        try:
+            with self._database as d:
+                removed = d.executemany(
+                    "DELETE FROM messages WHERE number = ?", [(n,) for n in self._removed]
+                )
+        except sqlite3.Error:
+            return
+        self._count -= removed.rowcount
+        self._removed.clear()
 
     def close(self) -> None:
         """Close the file."""
@@ -147,8 +155,9 @@ class Outbox:
             database.execute("PRAGMA locking_mode = EXCLUSIVE")
             self._refuse_foreign(database)
             database.execute("PRAGMA journal_mode = WAL")
-            # A crash of the process loses nothing; a power cut what was not yet on the disk.
-            database.execute("PRAGMA synchronous = NORMAL")
+            # Each commit is flushed: a power cut loses nothing that was taken, and nothing that was
+            # confirmed is sent again.
+            database.execute("PRAGMA synchronous = FULL")
             database.execute("BEGIN EXCLUSIVE")
             database.execute(f"PRAGMA application_id = {_MARK}")
             database.execute(_TABLE)
