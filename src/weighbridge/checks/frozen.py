@@ -124,7 +124,9 @@ def _impossible(drive: Drive, signal: Signal, part: slice, levels: frozenset[flo
         moving = speed[speed > SLIPS]
         idle = _idle(drive, signal)
         return bool(
-            value > IDLING * idle and moving.size >= 5 and moving.max() > IN_GEAR * moving.min()
+            value > max(IDLING * idle, STANDS)
+            and moving.size >= 5
+            and moving.max() > IN_GEAR * moving.min()
         )
     known = np.isfinite(speed)
     if np.count_nonzero(known) < 8:
