@@ -62,7 +62,7 @@ from weighbridge.signals.recent import LONGEST_STEP
 HERE = Path(__file__).parent
 MUTANTS = HERE / "night_mutants.csv"
 
-JUDGED, HOURS = 7301, 8.0
+JUDGED, HOURS = 7411, 8.0
 """The night of the page, and driving in it [h]; nobody looked at it before."""
 
 FARTHEST = 4.0
@@ -833,7 +833,7 @@ def page(result: Result, again: str) -> str:
         "loads": ", ".join(f"{load:.0f}" for load in LOADS),
         "length": f"{drives()[0].length / 60.0:.0f}",
         "judged": str(result.night.seed),
-        "forms": "; ".join(f"**{kind}** {', '.join(forms)}" for kind, forms in FORMS.items()),
+        "forms": "\n".join(f"| {kind} | {', '.join(forms)} |" for kind, forms in FORMS.items()),
         "mutants": mutants(),
     }
     return filled(HERE / "night.template.md", values)

@@ -11,6 +11,7 @@ PAGES = {
     "fleet_scale": "studies/fleet_scale.md",
     "gearboxes": "studies/gearboxes.md",
     "kerb": "studies/kerb.md",
+    "night": "studies/night.md",
     "truck_fleet": "studies/truck_fleet.md",
 }
 
