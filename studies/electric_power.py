@@ -43,7 +43,7 @@ class Powertrain(NamedTuple):
     copper : lost per torque squared, as part of the power at the highest torque [-]
     one_way : part of the copper's loss that falls on driving; the rest on recuperating [-]
     meter : reading over truth of the battery's power [-]
-    told : the same of the motor's power that the control unit reports [-]
+    reported : the same of the motor's power that the control unit reports [-]
     zero : offset of the current [A]
     rate : of the readings [Hz]
     late : lateness of the readings [s]
@@ -55,7 +55,7 @@ class Powertrain(NamedTuple):
     copper: float
     one_way: float
     meter: float
-    told: float
+    reported: float
     zero: float
     rate: float
     late: float
@@ -84,7 +84,7 @@ def drawn(rng: np.random.Generator) -> Powertrain:
         copper=between(0.02, 0.06),
         one_way=between(0.4, 0.6),
         meter=1.0 + 0.015 * float(rng.standard_normal()),
-        told=1.0 + 0.03 * float(rng.standard_normal()),
+        reported=1.0 + 0.03 * float(rng.standard_normal()),
         zero=0.5 * float(rng.standard_normal()),
         rate=float(rng.choice([2.0, 5.0, 10.0])),
         late=between(0.0, 0.3),
@@ -115,7 +115,7 @@ def with_power(made: SimulatedDrive, train: Powertrain, rng: np.random.Generator
     volts = 370.0 - 0.00012 * battery
     amps = train.meter * battery / volts + train.zero
     amps += 0.3 * rng.standard_normal(time.size)
-    power = train.told * shaft + 0.005 * usual * rng.standard_normal(time.size)
+    power = train.reported * shaft + 0.005 * usual * rng.standard_normal(time.size)
     drive = without_weather(made.drive)
     names = [n for n in drive.signals if n.startswith(("engine", "reference"))]
     return drive.without(*names).with_signals(

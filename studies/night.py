@@ -551,6 +551,8 @@ class Run:
         run = self
 
         def put_noted(box: Outbox, messages: list[tuple[str, bytes]]) -> None:
+            if run.clock.powerless:
+                return  # What it would do on its way out, a host without power does not.
             put(box, messages)
             taken.update((topic, bytes(payload)) for topic, payload in messages)
             run.digest.add(run.clock.now, messages)
@@ -727,7 +729,7 @@ def night(
     )  # fmt: skip
 
 
-def told(result: Result) -> str:
+def sentences(result: Result) -> str:
     """Say what one night showed, a line each."""
     wrong = result.judged.wrong
     memory = ", ".join(f"{m:.0f}" for _, m in sorted(result.judged.memory.items()))
@@ -854,7 +856,7 @@ def main() -> int:
             print(fault)
         for at, text in result.said:
             print(f"{at:9.1f} {text}")
-    print(told(result), flush=True)
+    print(sentences(result), flush=True)
     if asked.seed is None:
         again = "" if asked.once else night(JUDGED, asked.hours, apart=asked.apart).digest
         text = page(result, again)

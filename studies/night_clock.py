@@ -39,7 +39,7 @@ class Clock:
         self._hub = getcurrent()
         self._turns: dict[greenlet, int] = {}
         self._until = math.inf
-        self._off = False
+        self.powerless = False
 
     def monotonic(self) -> float:
         """Return the instant [s]."""
@@ -70,7 +70,7 @@ class Clock:
 
     def wait(self, seconds: float, waiting: list[tuple[Any, int]] | None = None) -> None:
         """Let others run for so long [s], or until somebody wakes who is in ``waiting``."""
-        if self._off:
+        if self.powerless:
             raise Off
         me = getcurrent()
         at = self.now + max(seconds, 0.0)
@@ -86,7 +86,7 @@ class Clock:
         self._hub.switch()
         if waiting is not None and (me, turn) in waiting:
             waiting.remove((me, turn))
-        if self._off:
+        if self.powerless:
             raise Off
 
     def wake(self, waiting: list[tuple[Any, int]]) -> None:
@@ -115,13 +115,13 @@ class Clock:
 
     def power_off(self) -> None:
         """Throw all threads away, where they are, and what was to be called."""
-        self._off = True
+        self.powerless = True
         for thread in list(self._turns):
             if thread:
                 thread.throw(Off)
         self._turns.clear()
         self._due.clear()
-        self._off = False
+        self.powerless = False
 
     def _push(self, at: float, what: Any, turn: int) -> None:
         self._count += 1

@@ -489,7 +489,7 @@ class Broker:
     ----------
     heard : messages in the order in which they came: instant [s], topic, payload
     unsure : those whose confirmation did not reach the client, or was not yet on its disk
-    confirmed : when the client was last told that a message came [s]
+    confirmed : when the client last learnt that a message came [s]
     """
 
     def __init__(self, world: World) -> None:

@@ -145,6 +145,21 @@ def test_a_dragged_engine_in_whole_percent_is_not_frozen(fleet):
     assert held_at(0.08) > 100
 
 
+@pytest.mark.parametrize(("value", "left_out"), [(0.0, False), (60.0, True)])
+def test_an_engine_that_stands_has_no_torque_to_freeze(fleet, value, left_out):
+    # A hybrid drives by its motor for a minute; or the bus falls silent, and only speed goes on.
+    drive = fleet.drive("truck").without("engine_torque_fraction", "reference_torque")
+    time = np.arange(drive.start + 1.0, drive.end - 1.0, 0.2)
+    alone = (time > 600.0) & (time < 660.0)
+    torque = np.where(alone, value, 100.0 + 80.0 * np.sin(time))
+    turning = np.where(alone, 0.0, 150.0 + 20.0 * np.sin(0.3 * time))
+    speed = 15.0 + 6.0 * np.sin(time / 8.0)
+    names = ("engine_torque", "engine_speed", "vehicle_speed")
+    made = [Signal(n, time, v) for n, v in zip(names, (torque, turning, speed), strict=True)]
+    kept = correct_drive(Drive("alone", {s.name: s for s in made}))
+    assert (len(kept.signals["engine_torque"]) < time.size - 100) == left_out
+
+
 def test_a_level_the_reading_comes_back_to_is_not_frozen(fleet):
     # Overrun through the gears: the control unit tells one value above its lowest each time.
     drive = fleet.drive("truck")

@@ -207,6 +207,19 @@ def paused(drive):
 
 def stepless(_, __):
     """A car whose ratio moves: engine and vehicle speed are read at instants of their own."""
+    weighed = simulated("cvt", None)
+    assert weighed.vehicle.driveline.stepless
+    return weighed
+
+
+def hybrid(_, __):
+    """Engine and battery of a power split, over a vehicle speed that is read on its own."""
+    weighed = simulated("hybrid", wb.Vehicle(kind="hybrid"))
+    assert weighed.vehicle.torque.source == "hybrid"
+    return weighed
+
+
+def simulated(name, base):
     known, driven = (
         simulate_car(
             replace(
@@ -215,11 +228,10 @@ def stepless(_, __):
                 duration=700.0,
             )
         )
-        for name, load in (("cvt-calibration", 0.0), ("cvt", 180.0))
+        for name, load in ((f"{name}-calibration", 0.0), (name, 180.0))
     )
-    weighed = wb.weigh(driven.drive, wb.calibrate(known.drive, mass=known.scenario.mass))
-    assert weighed.vehicle.driveline.stepless
-    return weighed
+    car = wb.calibrate(known.drive, mass=known.scenario.mass, vehicle=base)
+    return wb.weigh(driven.drive, car)
 
 
 def columns_of(table):
@@ -254,8 +266,9 @@ def rows_by_steps(drive, setup):
         (switched, {Reason.SHIFTING, Reason.BRAKING, Reason.NO_TORQUE}),
         (slow, {Reason.NO_MOTION, Reason.OVERRUN}),
         (stepless, {Reason.CLUTCH_SLIPPING}),
+        (hybrid, {Reason.OVERRUN}),
     ],
-    ids=["load", "switched", "slow", "stepless"],
+    ids=["load", "switched", "slow", "stepless", "hybrid"],
 )
 def test_rows_of_a_whole_drive_are_those_of_the_stages(weighing, loaded, kind, reasons):
     """Given the setup, nothing but what came before a row and soon after it changes it."""

@@ -12,11 +12,9 @@ from weighbridge.messages import Problem
 from weighbridge.navigation.motion import BY_SPEED
 from weighbridge.signals import Bools, Drive
 from weighbridge.signals.runs import marked_runs
+from weighbridge.vehicle.gear import STANDS
 from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.torque import source_of
-
-STANDS: Final = 20.0
-"""Slower than this an engine does not run [rad/s]: engines idle at 50 and more."""
 
 IDLE_TORQUE: Final = 0.05
 """Torque that a standing engine may show, over the highest of the drive [-]."""

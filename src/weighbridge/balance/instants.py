@@ -26,6 +26,7 @@ from weighbridge.vehicle.gear import (
     predict_gear,
     reported_gear_numbers,
     shifting,
+    spin_rate,
 )
 from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.torque import source_of
@@ -41,10 +42,6 @@ TYRE_SLIP: Final = 0.08
 """Slip of the driven wheels over the specific force, in g [-]: traction over load is 15 to 30 times
 the slip, and half of the load is on driven wheels (Gillespie, Fundamentals of Vehicle Dynamics,
 1992, ch. 10)."""
-
-RATE_SPAN: Final = 0.2
-"""The rate of an engine speed is looked at over so long before and after [s]: with 0.4 s the masses
-of six pairs of the corpus with a stepless gearbox change by 0.2 % at most."""
 
 SHIFT_MARGIN: Final = 0.4
 """Samples nearer than this to a change of gear are left out [s]."""
@@ -226,14 +223,10 @@ def ratio_rate(
     stamps : (n,) those of its engine speed [s]
     engine_speed, speed, accel : (n,) there [rad/s], [m/s], [m/s^2]
     """
-    signal = drive.signals["engine_speed"]
-    span = max(RATE_SPAN, signal.period)
-    # No further ahead in sum than the signal may be looked at.
-    nearer = replace(signal, ahead=max(signal.ahead - span, 0.0))
-    change = nearer.at(stamps + span) - signal.at(stamps - span)
     turning, moving = engine_speed > 0.0, speed > SLOWEST_GEARED
     known = turning & moving
-    faster = change / (2.0 * span) / np.where(known, engine_speed, 1.0)
+    spun = spin_rate(drive.signals["engine_speed"], stamps)
+    faster = spun / np.where(known, engine_speed, 1.0)
     return np.where(known, faster - accel / np.where(known, speed, 1.0), np.nan)
 
 

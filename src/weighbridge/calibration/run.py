@@ -51,7 +51,7 @@ from weighbridge.results.calibration import Calibration
 from weighbridge.signals import Drive
 from weighbridge.vehicle.fits import JOINT, RLS, SPEED_TORQUE_EKF
 from weighbridge.vehicle.model import Driveline, Vehicle
-from weighbridge.vehicle.torque_sources import SAME_REFERENCE, reference_torques
+from weighbridge.vehicle.reported_torque import SAME_REFERENCE, reference_torques
 
 if TYPE_CHECKING:
     from weighbridge.io.mapping import MappingSource

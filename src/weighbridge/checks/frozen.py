@@ -12,7 +12,7 @@ import numpy as np
 
 from weighbridge.signals import Bools, Drive, Floats, Signal
 from weighbridge.signals.runs import Runs, runs_of
-from weighbridge.vehicle.gear import SLIPS
+from weighbridge.vehicle.gear import SLIPS, STANDS
 
 SHORTEST: Final[dict[str, float]] = {"engine_speed": 10.0, "vehicle_speed": 20.0}
 """Runs of one value below may be a steady drive [s]."""
@@ -53,9 +53,6 @@ IN_GEAR: Final = 1.15
 """Highest over lowest vehicle speed that one engine speed does not outlast in gear [-]."""
 
 
-STANDS: Final = 20.0
-"""Slower than this an engine does not run [rad/s]: engines idle at 50 and more."""
-
 IDLING: Final = 1.25
 """Engine speed over that at standstill below which it may idle on its own [-]."""
 
@@ -87,7 +84,7 @@ def frozen(drive: Drive, name: str) -> Bools:
     least = min(shortest, SHORTEST.get(name, HELD))
     candidates = np.flatnonzero((runs.duration >= least) & (runs.length >= 8)).tolist()
     if name not in SHORTEST:
-        candidates = [k for k in candidates if not _stands(drive, signal.time[_part(runs, k)])]
+        candidates = [k for k in candidates if not _rests(drive, signal, _part(runs, k))]
     values, counts = np.unique(signal.values[runs.first[candidates]], return_counts=True)
     levels = frozenset(values[counts >= LEVEL_RUNS].tolist())
     impossible = [k for k in candidates if _impossible(drive, signal, _part(runs, k), levels)]
@@ -106,9 +103,11 @@ def _part(runs: Runs, k: int) -> slice:
     return slice(int(runs.first[k]), int(runs.first[k] + runs.length[k]))
 
 
-def _stands(drive: Drive, time: Floats) -> bool:
-    """Whether the engine stands meanwhile, as that of a hybrid does: it has no torque then."""
-    engine = _of(drive, "engine_speed", time)
+def _rests(drive: Drive, torque: Signal, part: slice) -> bool:
+    """Whether the engine stands meanwhile, without torque, as that of a hybrid does."""
+    if abs(torque.values[part.start]) > DRAGGED * np.max(np.abs(torque.values)):
+        return False
+    engine = _of(drive, "engine_speed", torque.time[part])
     known = engine[np.isfinite(engine)]
     return bool(known.size and np.median(known) < STANDS)
 

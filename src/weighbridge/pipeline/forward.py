@@ -39,6 +39,7 @@ from weighbridge.navigation.select import scaled_for_navigation
 from weighbridge.signals import Drive, Floats
 from weighbridge.signals.recent import STEP, STEPS, instants, recent
 from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle.torque import reading_battery
 
 if TYPE_CHECKING:
     from weighbridge.balance.table import ForceSetup
@@ -146,7 +147,7 @@ def identify_forward(weighing: Weighing, step: float = STEP) -> ForwardSetup:
         )
     time = result.balance.table.time
     return ForwardSetup(
-        vehicle=vehicle,
+        vehicle=reading_battery(vehicle, drive),
         navigation=_holding(navigation, motion.squat),
         force=replace(force, foot=replace(force.foot, ahead=AHEAD)),
         # What a finding leaves uncertain is uncertain on the way as well.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import partial
 from typing import Final, Literal, get_args
 
 import numpy as np
@@ -298,6 +299,10 @@ tyres). The table gives no powertrain: a six-cylinder diesel of 6.7 l and 165 kW
 box of a medium bus, its clutch opened by the control unit for every shift."""
 
 
+def _between(rng: np.random.Generator, low: float, high: float) -> float:
+    return float(rng.uniform(low, high))
+
+
 def random_vehicle(rng: np.random.Generator, kind: VehicleKind) -> SimulatedCar:
     """Draw a plausible vehicle of a kind.
 
@@ -373,10 +378,7 @@ def with_random_details(rng: np.random.Generator, car: SimulatedCar) -> Simulate
       Combustion Engine Fundamentals, 1988, ch. 6). The calculated load is of it
       at every speed (SAE J1979, PID 04).
     """
-
-    def between(low: float, high: float) -> float:
-        return float(rng.uniform(low, high))
-
+    between = partial(_between, rng)
     # Power at 100 km/h is force times speed, force is torque per radius.
     speed = 100.0 / 3.6
     spin_loss = between(0.2, 0.6) * car.mass * (car.wheel_radius / speed) ** 2
@@ -405,10 +407,7 @@ def with_random_ratios(rng: np.random.Generator, car: SimulatedCar) -> Simulated
     rng : numpy.random.Generator
     car : SimulatedCar
     """
-
-    def between(low: float, high: float) -> float:
-        return float(rng.uniform(low, high))
-
+    between = partial(_between, rng)
     return replace(
         car,
         lock_speed=between(1100.0, 2300.0) * RPM,
@@ -424,10 +423,7 @@ def with_random_ratios(rng: np.random.Generator, car: SimulatedCar) -> Simulated
 
 def _random_split(rng: np.random.Generator) -> PowerSplit:
     """Draw how a hybrid shares its power, and what its motor loses."""
-
-    def between(low: float, high: float) -> float:
-        return float(rng.uniform(low, high))
-
+    between = partial(_between, rng)
     return PowerSplit(
         start_power=between(4e3, 14e3),
         motor_power=between(35e3, 70e3),
@@ -480,10 +476,7 @@ def random_habits(rng: np.random.Generator) -> Habits:
     less at the usual distance of one to two seconds, most behind trucks (Zabat et al., The
     Aerodynamic Performance of Platoons, PATH report UCB-ITS-PRR-95-35, 1995).
     """
-
-    def between(low: float, high: float) -> float:
-        return float(rng.uniform(low, high))
-
+    between = partial(_between, rng)
     quick = between(0.2, 0.35)
     return Habits(
         least_braking=(between(0.2, 0.4), between(0.7, 1.1)),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -12,6 +12,7 @@ from scipy.ndimage import uniform_filter1d
 from weighbridge.messages import Problem, refused
 from weighbridge.signals import Bools, Drive, Floats, Signal
 from weighbridge.vehicle.air import Air
+from weighbridge.vehicle.force_sources import battery_use
 from weighbridge.vehicle.model import TorqueModel, Vehicle
 from weighbridge.vehicle.torque_sources import TORQUE_SOURCES, TorqueSource
 
@@ -67,6 +68,13 @@ def sources_of(vehicle: Vehicle | None) -> tuple[TorqueSource, ...]:
         for source in TORQUE_SOURCES.values()
         if not (source.of_one_engine if hybrid else source.of_all_motors)
     )
+
+
+def reading_battery(vehicle: Vehicle, drive: Drive) -> Vehicle:
+    """Return the vehicle as a whole drive shows how its battery is read, for parts of the drive."""
+    if "battery_current" not in source_of(vehicle).found(drive):
+        return vehicle
+    return replace(vehicle, torque=replace(vehicle.torque, battery=battery_use(drive)))
 
 
 def part_of_a_hybrid(vehicle: Vehicle, source: TorqueSource) -> Problem | None:

@@ -8,7 +8,7 @@ from typing import Final
 from weighbridge.arguments import check_choice
 from weighbridge.errors import ConfigError
 from weighbridge.vehicle.possible import curve, not_negative, positive, within
-from weighbridge.vehicle.torque_source import TorqueSource
+from weighbridge.vehicle.torque_source import BatteryUse, TorqueSource
 from weighbridge.vehicle.torque_sources import MEASURED, TORQUE_SOURCES
 
 EARLIEST_TORQUE: Final = -1.0
@@ -51,6 +51,7 @@ class TorqueModel:
         `weighbridge.vehicle.air.Air.charge` [-]; None where it is not known
     charge_exponent, charge_exponent_std : power of that charge with which the torque at one
         reading grows [-]; None for what is usual of the source
+    battery : how that of a drive is read, for stages that see a part of it; in no file
     """
 
     source: str | None = None
@@ -71,6 +72,7 @@ class TorqueModel:
     charge: float | None = None
     charge_exponent: float | None = None
     charge_exponent_std: float | None = None
+    battery: BatteryUse | None = None
 
     def __post_init__(self) -> None:
         if self.source is not None:

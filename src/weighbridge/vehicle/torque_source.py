@@ -5,12 +5,25 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import Final, Protocol
+from typing import Final, NamedTuple, Protocol
 
 import numpy as np
 
 from weighbridge.messages import Problem
 from weighbridge.signals import Drive, Floats, Signal
+
+
+class BatteryUse(NamedTuple):
+    """How the battery of a drive is read.
+
+    Attributes
+    ----------
+    sign : with which its power drives [-]
+    rest : power that it gives beside driving [W]
+    """
+
+    sign: float
+    rest: float
 
 
 class TorqueConstants(Protocol):
@@ -24,6 +37,11 @@ class TorqueConstants(Protocol):
     @property
     def engine_efficiency(self) -> float:
         """Shaft over fuel power [-]."""
+        ...
+
+    @property
+    def battery(self) -> BatteryUse | None:
+        """How the battery of the drive is read; None to find it from the drive."""
         ...
 
 

@@ -11,9 +11,8 @@ from typing import Final
 import numpy as np
 
 from weighbridge.constants import PETROL_HEATING_VALUE, PETROL_STOICHIOMETRIC_RATIO
-from weighbridge.messages import refused
 from weighbridge.registry import Registry
-from weighbridge.signals import Drive, Floats, Signal
+from weighbridge.signals import Drive, Floats
 from weighbridge.vehicle.force_sources import (
     BATTERY,
     HYBRID,
@@ -22,6 +21,7 @@ from weighbridge.vehicle.force_sources import (
     TRACTION_FORCE,
     WHEEL_TORQUE,
 )
+from weighbridge.vehicle.reported_torque import torque_in_nm, torque_in_percent
 from weighbridge.vehicle.torque_source import (
     MOTOR_BETWEEN_STD,
     REPORTED,
@@ -38,13 +38,11 @@ __all__ = [
     "REPORTED_TERMS",
     "ROUGH",
     "ROUGH_TERMS",
-    "SAME_REFERENCE",
     "TORQUE_SOURCES",
     "TorqueSource",
     "TorqueTerms",
     "air_flow_torque",
     "lowest_load",
-    "reference_torques",
 ]
 
 
@@ -67,56 +65,6 @@ def air_flow_torque(
     fuel_flow = mass_air_flow / (PETROL_STOICHIOMETRIC_RATIO * lambda_1)
     power = efficiency * PETROL_HEATING_VALUE * fuel_flow
     return np.asarray(power / np.maximum(engine_speed, 30.0))
-
-
-SAME_REFERENCE: Final = 0.02
-"""Reference torques that differ by less are one [-]."""
-
-
-def reference_torques(reference: Signal) -> list[tuple[float, float]]:
-    """Reference torques that a drive reports, each in a tenth of the samples or more.
-
-    Parameters
-    ----------
-    reference : with at least one sample [N m]
-
-    Returns
-    -------
-    Values [N m] with the time each was reported first [s], in the order of time
-    """
-    order = np.argsort(reference.values)
-    ascending = reference.values[order]
-    cuts = np.flatnonzero(np.diff(ascending) > SAME_REFERENCE * np.abs(ascending[:-1])) + 1
-    groups = [g for g in np.split(order, cuts) if g.size >= 0.1 * order.size]
-    found = [
-        (float(np.median(reference.values[g])), float(reference.time[g].min())) for g in groups
-    ]
-    return sorted(found, key=lambda f: f[1])
-
-
-def _reference(drive: Drive, time: Floats, model: TorqueConstants) -> Floats:
-    """Return the torque that a percent torque is a part of, at stamps [N m].
-
-    That of the log; where the log has several, that of the vehicle file, else the last one.
-    """
-    reference = drive.get("reference_torque")
-    if reference is not None and len(reference):
-        if len(reference_torques(reference)) < 2:
-            return np.full(time.size, np.median(reference.values))
-        if model.reference_torque is None:
-            last = np.searchsorted(reference.time, time, side="right") - 1
-            return np.asarray(reference.values[np.maximum(last, 0)])
-    if model.reference_torque is None:
-        raise refused("torque.no_reference", drive=drive.name)
-    return np.full(time.size, model.reference_torque)
-
-
-def _torque(drive: Drive, time: Floats, _: TorqueConstants) -> Floats:
-    return drive.signals["engine_torque"].at(time)
-
-
-def _percent(drive: Drive, time: Floats, model: TorqueConstants) -> Floats:
-    return drive.signals["engine_torque_fraction"].at(time) * _reference(drive, time, model)
 
 
 def _load(drive: Drive, time: Floats, _: TorqueConstants) -> Floats:
@@ -146,7 +94,7 @@ MEASURED: Final = "measured"
 _MEASURED: Final = REPORTED(
     name=MEASURED,
     signals=("engine_torque",),
-    reading=_torque,
+    reading=torque_in_nm,
     title="torque in N m",
     words="torque in N m, as the control unit reports it",
     axis="Recorded torque [N m]",
@@ -158,7 +106,7 @@ _MEASURED: Final = REPORTED(
 _PERCENT: Final = REPORTED(
     name="percent",
     signals=("engine_torque_fraction",),
-    reading=_percent,
+    reading=torque_in_percent,
     needs_reference=True,
     motor_between_std=MOTOR_BETWEEN_STD,
     title="torque in percent",
