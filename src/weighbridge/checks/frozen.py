@@ -105,7 +105,8 @@ def _part(runs: Runs, k: int) -> slice:
 
 def _rests(drive: Drive, torque: Signal, part: slice) -> bool:
     """Whether the engine stands meanwhile, without torque, as that of a hybrid does."""
-    if abs(torque.values[part.start]) > DRAGGED * np.max(np.abs(torque.values)):
+    # What it reads then may be less than nothing.
+    if torque.values[part.start] > DRAGGED * np.max(torque.values):
         return False
     engine = _of(drive, "engine_speed", torque.time[part])
     known = engine[np.isfinite(engine)]
