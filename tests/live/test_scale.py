@@ -24,10 +24,12 @@ from weighbridge.pipeline.forward import (
     forward_weigh,
     identify_forward,
     lateness,
+    resume,
     step,
     with_open,
 )
-from weighbridge.signals.recent import LONGEST_STEP, STEP, recent
+from weighbridge.signals.catalogue import IMU_SIGNALS
+from weighbridge.signals.recent import LONGEST_STEP, STEP, instants, recent
 from weighbridge.simulation import MIDSIZE, Loading, Scenario, short_route, simulate_car
 
 
@@ -285,6 +287,14 @@ def test_looks_are_frequent_until_there_is_a_mass():
             at.append(move.driven)
             move.looks(weighed=len(at) > 4)
     assert at == [30.0, 45.0, 60.0, 75.0, 90.0, 135.0, 203.0, 305.0, 458.0]
+    move.look_soon(90.0)
+    for _ in range(100):
+        move.go_on(1.0, moved=True)
+        if move.is_due:
+            at.append(move.driven)
+            move.looks(weighed=True)
+    assert at[9:] == [630.0, 645.0, 668.0]
+    assert move.rested == 0.0
 
 
 def test_a_checkpoint_loses_nothing(short, weighing, forward, half_driven):
@@ -462,8 +472,9 @@ def test_a_change_of_load_forgets_the_learned_mass_and_its_records(car, loaded):
     assert scale.recorded().signals["accel_x"].duration < 1.0
 
 
-def test_a_change_of_load_is_found_on_the_way(car, loaded):
-    """The records tell the stop at which it did, and minutes are counted from there."""
+@pytest.fixture(scope="module")
+def delivered():
+    """Simulate a car that takes 400 kg on in two minutes on its way."""
     route = short_route()
     made = simulate_car(
         Scenario(
@@ -471,8 +482,68 @@ def test_a_change_of_load_is_found_on_the_way(car, loaded):
             loading=(Loading(distance=0.45 * route.length, duration=120.0, load=500.0),),
         )
     )  # fmt: skip
+    return made, made.drive.between(made.drive.start, made.drive.start + 640.0)
+
+
+@pytest.mark.parametrize("equipment", ["setup", "learnt", "no inertial sensor"])
+def test_after_a_stop_the_mass_of_before_is_as_unsure_as_its_load(
+    car, weighing, setup, delivered, equipment
+):
+    """While the vehicle stands the mass stays; on the move it holds the new load at once."""
+    made, part = delivered
+    if equipment == "no inertial sensor":
+        part = part.without(*IMU_SIGNALS)
+    scale = wb.LiveScale(
+        car, info=made.drive.info, step=LONGEST_STEP,
+        setup=replace(setup, step=LONGEST_STEP) if equipment == "setup" else None,
+    )  # fmt: skip
+    speed, new = part.speed, made.scenario.mass + 400.0
+    seen = []
+    for edge, block in zip(even(part, 4.0)[1:], blocks(part, even(part, 4.0)), strict=False):
+        scale.update_block(block)
+        moves = speed.held(np.array([edge]))[0] > 1.0
+        seen.append((edge, bool(moves), scale.weighing(), scale.weighing(ahead=True)))
+    stands = [k for k, (_, moves, *_) in enumerate(seen) if not moves]
+    stop = max(np.split(stands, np.flatnonzero(np.diff(stands) > 1) + 1), key=len)
+    stood = [seen[k][2] for k in stop[2:]]
+    after = [w for _, moves, *both in seen[stop[-1] + 1 :] if moves for w in both]
+    assert all(w.std < 0.08 * w.mass for w in stood)
+    # In the first step samples may still be late.
+    settled, _ = soon = after[2:4]
+    assert settled.std > 0.15 * settled.mass
+    assert all(w.std > 0.08 * w.mass for w in soon)
+    assert all(w.status is LiveStatus.LEARNING for w in soon)
+    assert all(w.reason_id in {"live.after_stop", "live.wide"} for w in soon)
+    assert all(abs(w.mass - new) < 4.0 * w.std for w in after[2:])
+    assert after[-1].mass == pytest.approx(new, rel=0.06)
+    assert after[-1].std < 0.09 * new
+
+
+def test_a_look_soon_after_a_stop_leaves_the_other_load_on_trial(car, delivered):
+    made, part = delivered
+    speed = part.speed
+    stands = speed.time[speed.values == 0.0]
+    off = float(stands[stands < part.start + 450.0][-1])
+    soon = part.between(part.start, off + 20.0)
+    weighing = wb.weigh(soon, car)
+    assert not weighing.load_changed
+    setup = identify_forward(weighing, LONGEST_STEP)
+    state = resume(weighing, soon, soon.end, setup)
+    assert state.joint.load.open
+    new = made.scenario.mass + 400.0
+    assert abs(state.joint.mass - new) < 4.0 * state.joint.std(setup.joint)
+    for until in instants(part, LONGEST_STEP):
+        if until > soon.end:
+            seen = recent(part, until, LONGEST_STEP)
+            state, running = step(state, seen, until, setup)
+            assert all(np.abs(running.mass - new) < 4.0 * running.std)
+    assert state.joint.mass == pytest.approx(new, rel=0.03)
+
+
+def test_a_change_of_load_is_found_on_the_way(car, delivered):
+    """The records tell the stop at which it did, and minutes are counted from there."""
+    made, part = delivered
     scale = wb.LiveScale(car, info=made.drive.info, step=LONGEST_STEP)
-    part = made.drive.between(made.drive.start, made.drive.start + 640.0)
     told = fed(scale, part, even(part, 20.0))
     low, high = told.interval()
     assert low < made.scenario.mass + 500.0 < high

@@ -96,7 +96,7 @@ def step(state, time, row, y, noise_var, odds, params):
     -------
     state : LoadState
     first, first_var : float
-        Mean and variance of the first state over both hypotheses.
+        The first state, and its mean square error over both hypotheses.
     changed_from : int
         Row from which a jump is now believed; -1 if none.
 
@@ -118,16 +118,16 @@ def step(state, time, row, y, noise_var, odds, params):
         state = LoadState(same, changed, True, state.prior, state.trial_row, state.rows + 1)
         share = 1.0 / (1.0 + np.exp(-log_odds(state, params)))
         # Few rows after a stop are a launch, on a slipping clutch perhaps.
-        share *= min(1.0, (state.rows - state.trial_row) / params.fewest)
+        believed = share * min(1.0, (state.rows - state.trial_row) / params.fewest)
     else:
         state = LoadState(same, same, False, 0.0, state.trial_row, state.rows + 1)
-        share = 0.0
-    first = (1.0 - share) * state.same.x[0] + share * state.changed.x[0]
-    first_var = (
-        (1.0 - share) * state.same.cov[0, 0]
-        + share * state.changed.cov[0, 0]
-        + share * (1.0 - share) * (state.same.x[0] - state.changed.x[0]) ** 2
-    )
+        share = believed = 0.0
+    first = (1.0 - believed) * state.same.x[0] + believed * state.changed.x[0]
+    within = (1.0 - share) * state.same.cov[0, 0] + share * state.changed.cov[0, 0]
+    off = (1.0 - share) * (state.same.x[0] - first) ** 2
+    off += share * (state.changed.x[0] - first) ** 2
+    # What is unmodelled widens each of the two, and not the distance between them.
+    first_var = within + params.temper * off
     return state, first, first_var, changed_from
 
 

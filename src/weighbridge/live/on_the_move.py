@@ -7,7 +7,10 @@ from typing import Final
 
 import numpy as np
 
+from weighbridge.balance.averaging import WINDOW
 from weighbridge.balance.table import MOVING
+from weighbridge.estimators.joint import JointSettings
+from weighbridge.estimators.joint.possible import FEWEST
 from weighbridge.signals import Drive
 
 GAP: Final = 1.0
@@ -17,13 +20,16 @@ FIRST: Final = 30.0
 """Time on the move after which a drive is looked at for the first time [s]."""
 
 AGAIN: Final = 15.0
-"""While there is no mass, it is looked at again after so long on the move [s],"""
+"""It is looked at again after so long on the move at the earliest [s],"""
 
 SLOWER: Final = 1.1
-"""but not before so many times as much [-]."""
+"""while there is no mass, not before so many times as much since the last long stop [-],"""
 
 GROWTH: Final = 1.5
-"""With a mass it is looked at again after so many times as much [-]."""
+"""and with a mass so many times as much [-]."""
+
+FOLLOWED: Final = FEWEST * JointSettings().fewest_windows * WINDOW
+"""A look shows what was loaded at a stop after so long on the move [s]."""
 
 PERIOD: Final = 600.0
 """At the latest it is looked at after so long on the move [s]."""
@@ -43,6 +49,8 @@ class OnTheMove:
     before : what it was when all signals were silent the last time [s]
     looked_at, look_at : what it was at the last look, and is at the next [s]
     stood : the vehicle has stood for so long [s]
+    rested : longest stop after which no look has seen enough of the driving [s]
+    anew : time on the move until it [s]; looks are more often from there
     rests : with the last step it has stood for `REST`
     """
 
@@ -52,6 +60,8 @@ class OnTheMove:
     looked_at: float = 0.0
     look_at: float = FIRST
     stood: float = 0.0
+    rested: float = 0.0
+    anew: float = 0.0
     rests: bool = False
 
     def go_on(self, step: float, *, moved: bool) -> None:
@@ -72,9 +82,16 @@ class OnTheMove:
 
     def looks(self, *, weighed: bool) -> None:
         """Take it that they are looked at now, and that there is a mass already, or none."""
-        self.looked_at = self.driven
-        later = self.driven * GROWTH if weighed else max(self.driven + AGAIN, self.driven * SLOWER)
-        self.look_at = min(later, self.driven + PERIOD)
+        self.looked_at, since = self.driven, self.driven - self.anew
+        if since >= FOLLOWED:
+            self.rested = 0.0
+        wait = max(((GROWTH if weighed else SLOWER) - 1.0) * since, AGAIN)
+        self.look_at = self.driven + min(wait, PERIOD)
+
+    def look_soon(self, stood: float) -> None:
+        """Take it that the load may be another after a stop [s], which only a look shows."""
+        self.rested, self.anew = max(self.rested, stood), self.driven
+        self.look_at = min(self.look_at, self.driven + FIRST)
 
     def begin_anew(self) -> None:
         """Take it that nothing shows this load yet, as after a start."""

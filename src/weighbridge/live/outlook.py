@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Final, NamedTuple
 
 from scipy.special import ndtri
 
 from weighbridge.live.weighing import LiveStatus
 from weighbridge.messages import Problem
+from weighbridge.report.text import duration
 
 GOOD, BETTER = 0.05, 0.02
 """Half widths of the 95 % interval over the mass that are asked for [-]."""
@@ -44,6 +45,23 @@ class Outlook:
     advice: str = ""
 
 
+class UnfollowedStop(NamedTuple):
+    """A stop after which the vehicle drives on, and nothing of that is in the mass yet.
+
+    Attributes
+    ----------
+    stood : how long the vehicle stood [s]; 0 where there is no such stop
+    std : relative standard deviation of the mass by a change of load there [-]
+    """
+
+    stood: float = 0.0
+    std: float = 0.0
+
+
+NO_STOP: Final = UnfollowedStop()
+"""All that was driven is in the mass."""
+
+
 def outlook(
     mass: float,
     std: float,
@@ -54,6 +72,7 @@ def outlook(
     silent: Sequence[str],
     first: float,
     std_found: float = math.nan,
+    stop: UnfollowedStop = NO_STOP,
     unproved: Problem | None = None,
     since: float = 0.0,
     wait: float = 0.0,
@@ -72,6 +91,7 @@ def outlook(
     first : time on the move before which nothing is weighed [s]
     std_found : standard deviation over the mass that the last look had, shown or not [-]; NaN
         before the first
+    stop : of which the mass knows nothing yet
     unproved : why the mass is not yet one of what is driven now; None where it is
     since : time on the move since then, which no look has seen yet [s]
     wait : time on the move until it will [s]
@@ -100,6 +120,8 @@ def outlook(
         reason = _missing(silent, reason) if silent else reason
     elif silent:
         reason = _missing(silent)
+    elif _REACH * math.hypot(std / mass, stop.std) > GOOD:
+        reason = Problem.of("live.after_stop", stood=duration(stop.stood))
     else:
         reason = unproved
     return Outlook(

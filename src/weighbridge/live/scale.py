@@ -12,6 +12,8 @@ import numpy as np
 
 from weighbridge.arguments import as_floats, check_text, check_type
 from weighbridge.errors import ConfigError
+from weighbridge.estimators.joint import JointSettings
+from weighbridge.estimators.joint.load_stops import SHORTEST_BY_SPEED, unfollowed_std
 from weighbridge.estimators.judging import STOP
 from weighbridge.live.arrival import health_of, is_parked, needed_signals
 from weighbridge.live.checkpoint import packed, refuse_absurd, unpacked
@@ -20,7 +22,7 @@ from weighbridge.live.kerb import Kerb, Weighed, stands
 from weighbridge.live.learning import LONGEST, Learned, known_mass
 from weighbridge.live.looking import Look, Step
 from weighbridge.live.on_the_move import FIRST, OnTheMove, moves
-from weighbridge.live.outlook import Outlook, outlook
+from weighbridge.live.outlook import NO_STOP, Outlook, UnfollowedStop, outlook
 from weighbridge.live.questions import by_tilt, doubts, of_before
 from weighbridge.live.records import LATENESS, Records
 from weighbridge.live.source import Samples
@@ -188,6 +190,7 @@ class LiveScale:
             "next": self._next,
             "driven": self._move.driven,
             "driven_this_load": self._move.this_load,
+            "rested": self._move.rested,
             "kerb": self._kerb,
             "since": self._since,
             "tared": self._tared,
@@ -224,7 +227,9 @@ class LiveScale:
             )
             scale._setup, scale._state = content["setup"], content["state"]
             scale._next, scale._learned = content["next"], content["learned"]
-            scale._move = OnTheMove(content["driven"], content["driven_this_load"])
+            scale._move = OnTheMove(
+                content["driven"], content["driven_this_load"], rested=content["rested"]
+            )
             scale._kerb = content["kerb"]
             scale._since, scale._tared = content["since"], content["tared"]
             scale._learns, scale.kept_at = content["learns"], content["pace"]
@@ -325,7 +330,8 @@ class LiveScale:
         state = self._ahead() if ahead else self._state
         mass, std, floor, at = known_mass(state, self._setup, self._learned)
         parked, health = self._health(silence)
-        found = self._outlook(mass, std, floor, health, state, parked=parked)
+        stop = self._unfollowed_stop(state)
+        found = self._outlook(mass, std, floor, health, state, stop, parked=parked)
         newest = self._records.newest
         learned, kerb = self._learned, self._kerb.state()
         return LiveWeighing(
@@ -337,7 +343,7 @@ class LiveScale:
             parked=parked,
             refusal=found.reason,
             mass=mass,
-            std=std,
+            std=math.hypot(std, mass * stop.std),
             tare=self.vehicle.tare,
             gross=self.vehicle.gross,
             tared=self._tared,
@@ -377,6 +383,22 @@ class LiveScale:
         """Whether a mass is of a load that was there before all signals were silent."""
         return math.isfinite(mass) and self._since < self._records.resumed
 
+    def _unfollowed_stop(self, state: ForwardState | None) -> UnfollowedStop:
+        """Return the longest stop since what the mass is made of, and what it leaves open.
+
+        A stop that is no longer than the vehicle has stood by now is this one: the mass is that
+        with which it came.
+        """
+        if self._setup is not None and state is not None and state.joint.windows:
+            stood, by_speed = forward.unfollowed_stop(state), False
+            settings = self._setup.joint.settings
+        else:
+            stood, by_speed, settings = self._move.rested, True, JointSettings()
+        if stood <= self._move.stood:
+            return NO_STOP
+        std = unfollowed_std(stood, settings.change_std, by_speed=by_speed)
+        return UnfollowedStop(stood, std)
+
     def _ahead(self) -> ForwardState | None:
         """State after all samples that came, to look at alone; see `forward.looked_ahead`."""
         state, setup, records = self._state, self._setup, self._records
@@ -406,6 +428,7 @@ class LiveScale:
         floor: float,
         health: tuple[SignalHealth, ...],
         state: ForwardState | None,
+        stop: UnfollowedStop,
         *,
         parked: bool,
     ) -> Outlook:
@@ -431,6 +454,7 @@ class LiveScale:
             silent=silent,
             first=FIRST,
             std_found=math.nan if learned is None else learned.std_found,
+            stop=stop,
             unproved=self._unproved(mass, state, parked=parked),
             since=since,
             wait=self._to_look() if waits else 0.0,
@@ -483,7 +507,10 @@ class LiveScale:
             self._take(wait=True)
         if until - length <= self._records.resumed < until:
             self._move.before = self._move.driven
+        stood = self._move.stood
         self._move.go_on(length, moved=moved)
+        if moved and stood >= SHORTEST_BY_SPEED and not self._goes_on():
+            self._move.look_soon(stood)
         if self._setup is not None and self._state is not None:
             self._state, _ = forward.step(self._state, seen, until, self._setup)
         self._tilt(seen, until, length, still=still)
@@ -544,7 +571,7 @@ class LiveScale:
         if learned.since > max(look.drive.start, self._since):
             # The load has changed on the way.
             self._since = learned.since
-            self._move.this_load = look.driven_since(learned.since)
+            self._move.this_load, self._move.rested = look.driven_since(learned.since), 0.0
 
     def _health(self, silence: float) -> tuple[bool, tuple[SignalHealth, ...]]:
         """Whether the vehicle is parked, and how each signal comes."""

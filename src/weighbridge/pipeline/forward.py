@@ -259,6 +259,12 @@ def too_wide(state: ForwardState | None, setup: ForwardSetup | None) -> float:
     return std if std > sizes.settings.widest else 0.0
 
 
+def unfollowed_stop(state: ForwardState) -> float:
+    """Longest stop, the one that goes on counted, after which no window is in the mass yet [s]."""
+    windows = state.windows
+    return float(max(windows.rest, windows.longest, windows.stood if windows.rows else 0.0))
+
+
 def lateness(setup: ForwardSetup) -> float:
     """Time that a row waits for what shows it [s]: delays, and look-ahead of the stages."""
     by_motion = forward.lateness(setup.navigation) + setup.force.ahead

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from weighbridge.estimators.joint.load_stops import change_odds
-from weighbridge.estimators.joint.possible import averaged
+from weighbridge.estimators.joint.load_stops import CHANGE_ODDS, change_odds
+from weighbridge.estimators.joint.possible import averaged, enough_after
 from weighbridge.estimators.joint.problem import (
     FilterInput,
     JointSizes,
@@ -79,7 +79,8 @@ class JointState(NamedTuple):
 def resumed(given: FilterInput, setup: JointSetup, until: float) -> JointState:
     """Return the state after the windows of a drive that was weighed as a whole.
 
-    Its motion was smoothed, and its changes of load are those found with hindsight.
+    Its motion was smoothed, and its changes of load are those found with hindsight. One at a stop
+    with too little driving after it is neither found nor excluded, and is tried on.
 
     Parameters
     ----------
@@ -90,24 +91,43 @@ def resumed(given: FilterInput, setup: JointSetup, until: float) -> JointState:
     seen = int(given.time.searchsorted(until, side="right"))
     if not seen:
         return JointState()
-
     part = given.first(seen)
-    end, same, _ = averaged(part, setup.std, setup.settings, setup.std_factor)
+    open_from = _open_from(part, setup)
+    known = part.first(open_from)
+    end, same, _ = averaged(known, setup.std, setup.settings, setup.std_factor)
     total = part.weight()
     jumps = np.flatnonzero(part.added.any(axis=1))
     before = part.first(int(jumps[-1])).weight() if jumps.size else 0.0
+    load = load_change.initial_state(end)._replace(rows=open_from)  # type: ignore[no-untyped-call]
+    mass, var = end.x[0], end.cov[0, 0]
+    weighed = load_params(given.params, setup.std, setup.settings)
+    for k in range(open_from, seen):
+        odds = part.odds[k] if k == open_from else np.nan
+        load, mass, var, _ = load_change.step(
+            load, part.time[k], part.rows[k], part.y[k], part.noise[k], odds, weighed
+        )
+        same = load.same
     low = too_low(same.cov[0, 0] * setup.attenuating_var * (total - before))
-    load = load_change.initial_state(end)  # type: ignore[no-untyped-call]
     return JointState(
-        load=load._replace(rows=seen),
-        switch=_first_switch(end._replace(rows=seen), given.params, setup),
+        load=load,
+        switch=_first_switch(load.same._replace(rows=seen), given.params, setup),
         total=total,
         total_at_load=before,
-        total_at_trial=before,
+        total_at_trial=known.weight() if open_from < seen else before,
         windows=seen,
-        mass=float(end.x[0] * (1.0 + low)),
-        var=float(end.cov[0, 0]),
+        mass=float(mass * (1.0 + low)),
+        var=float(var),
     )
+
+
+def _open_from(given: FilterInput, setup: JointSetup) -> int:
+    """Return the window from which another load is still tried; the number of windows if none."""
+    count = given.time.size
+    changed = np.asarray(np.any(given.added > 0.0, axis=1))
+    stops = np.flatnonzero((given.odds >= CHANGE_ODDS) | changed)
+    if not stops.size or changed[stops[-1]] or enough_after(int(stops[-1]), count, setup.settings):
+        return count
+    return int(stops[-1])
 
 
 class Window(NamedTuple):

@@ -79,6 +79,21 @@ def change_odds(stood: Floats, *, by_speed: bool = False) -> Floats:
     return odds
 
 
+def unfollowed_std(stood: float, change_std: float, *, by_speed: bool = False) -> float:
+    """Relative standard deviation of a mass of before a stop, by a change of load there [-].
+
+    Parameters
+    ----------
+    stood : how long the vehicle stood [s]; nothing that followed is in the mass yet
+    change_std : of a change of load over the mass [-]
+    by_speed : as of `change_odds`
+    """
+    if stood < (SHORTEST_BY_SPEED if by_speed else STOP):
+        return 0.0
+    odds = float(change_odds(np.array([stood]), by_speed=by_speed)[0])
+    return change_std / float(np.sqrt(1.0 + np.exp(-odds)))
+
+
 def unseen_std(stood: Floats, boarding_std: float) -> float:
     """Relative standard deviation by loads that change where no change is looked for [-].
 

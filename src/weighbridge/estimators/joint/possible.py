@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -92,6 +92,11 @@ class Averaged(NamedTuple):
     possible: PossibleChange | None
 
 
+def enough_after(stop: Any, count: int, settings: JointSettings) -> Any:
+    """Whether the windows from one on, or from each of several, show what was loaded before it."""
+    return count - stop >= FEWEST * settings.fewest_windows
+
+
 def averaged(given: FilterInput, std: Floats, settings: JointSettings, factor: float) -> Averaged:
     """Return the state after the last window over all hypotheses of a change of load more or less.
 
@@ -125,7 +130,7 @@ def averaged(given: FilterInput, std: Floats, settings: JointSettings, factor: f
     changed = np.asarray(np.any(given.added > 0.0, axis=1))
     found = np.flatnonzero(np.isfinite(given.odds) & changed)
     stops = np.flatnonzero(np.isfinite(given.odds) & ~changed)
-    stops = stops[given.time.size - stops >= FEWEST * settings.fewest_windows]
+    stops = stops[enough_after(stops, given.time.size, settings)]
     stops = stops[np.argsort(-given.odds[stops], kind="stable")][:MOST]
     if not stops.size + found.size:
         return Averaged(same, same, None)
