@@ -306,6 +306,21 @@ def test_parameter_that_is_never_answered_is_dropped():
     assert len(schedule.fast) == 2
 
 
+@pytest.mark.parametrize("together", [False, True])
+def test_a_parameter_that_was_answered_is_asked_again_after_damage(together):
+    """A cable in trouble loses many answers of one request, and few of the others."""
+    schedule = Schedule({0x7E8: {0x0C, 0x0D, 0x04, 0x11}}, together=together)
+    before = schedule.fast
+    for k in range(20):
+        request = schedule.next(0.1 * k)
+        schedule.note(request, request.parameters)
+    for k in range(200):
+        request = schedule.next(2.0 + 0.1 * k)
+        lost = 0x0D in request.parameters or k % 3 == 0
+        schedule.note(request, request.parameters[1:] if lost else request.parameters)
+    assert schedule.fast == before
+
+
 def test_silent_vehicle_loses_no_parameter():
     schedule = Schedule({0x7E8: {0x0C, 0x0D}}, together=False)
     for k in range(60):

@@ -52,9 +52,9 @@ CHARGING: Final = 13.2
 _ONE_FRAME: Final = 7
 # A request has 6 parameters at most (ISO 15031-5).
 _MOST_TOGETHER: Final = 6
-# Several at once that were answered in part so often in a row are asked for one by one.
+# Several at once that were never answered in whole, and so often in part, are asked one by one.
 _MOST_PARTIAL: Final = 3
-# Left unanswered so often in a row, a parameter is not asked for again.
+# Never answered and so often left unanswered in a row, a parameter is not asked for again.
 _MOST_MISSES: Final = 5
 # An engine turns faster than this when it runs, a vehicle moves faster [rad/s, m/s].
 _RUNS: Final = scalar_to_si(200.0, "rpm")
@@ -107,6 +107,8 @@ class Schedule:
         self._together = together
         self._misses: dict[int, int] = {}
         self._partial: dict[Request, int] = {}
+        self._there: set[int] = set()
+        self._whole: set[Request] = set()
         self._turn = 0
         self._seldom_last = False
         self._arrange()
@@ -141,13 +143,18 @@ class Schedule:
         return self._fast[self._turn]
 
     def note(self, request: Request, answered: Iterable[int]) -> None:
-        """Learn from an answer: what is never answered is not asked for again."""
+        """Learn from an answer: what is never answered is not asked for again.
+
+        What was answered before, and is not now, was lost on the way.
+        """
         there = set(answered)
         missing = [n for n in request.parameters if n not in there]
+        self._there |= there
         for number in there:
             self._misses[number] = 0
         if not missing:
-            self._partial.pop(request, None)
+            self._whole.add(request)
+        if request in self._whole:
             return
         # Some control units answer the first of several, or nothing.
         if len(request.parameters) > 1:
@@ -159,7 +166,8 @@ class Schedule:
         # While nothing is answered at all, it is the vehicle that is silent.
         for number in missing:
             self._misses[number] = self._misses.get(number, 0) + 1
-            if self._misses[number] >= _MOST_MISSES and any(m == 0 for m in self._misses.values()):
+            often = number not in self._there and self._misses[number] >= _MOST_MISSES
+            if often and any(m == 0 for m in self._misses.values()):
                 self._owner.pop(number, None)
                 self._arrange()
 
