@@ -99,6 +99,7 @@ EQUIPMENT: Final[dict[str, Callable[[Drive], Drive]]] = {
     "IMU 50 Hz, OBD 1 Hz": lambda d: polled(every(d, IMU, 0.02), 1.0),
     "IMU 20 Hz": lambda d: every(d, IMU, 0.05),
     "IMU 10 Hz": lambda d: every(d, IMU, 0.1),
+    "IMU 5 Hz": lambda d: every(d, IMU, 0.2),
     "one axis": one_axis,
     "no IMU": lambda d: d.without(*IMU),
     "no IMU, OBD 1 Hz": lambda d: polled(d.without(*IMU), 1.0),

@@ -11,7 +11,13 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from typing import Final
 
-from weighbridge.checks.clocks import check_overlap, check_pauses, check_rates, check_splices
+from weighbridge.checks.clocks import (
+    check_overlap,
+    check_pauses,
+    check_rates,
+    check_splices,
+    without_slow,
+)
 from weighbridge.checks.correcting import corrected
 from weighbridge.checks.derived import without_derived
 from weighbridge.checks.digits import with_half_digits
@@ -84,7 +90,7 @@ def correct_drive(drive: Drive, vehicle: Vehicle | None = None) -> Drive:
     drive = well_formed(drive)
     if found := tuple(check_rates(drive, vehicle)):
         return drive.with_problems(*found)
-    drive = one_recording(drive)
+    drive = without_slow(one_recording(drive))
     found = tuple(check_overlap(drive, vehicle))
     if any(p.serious for p in found):
         return drive.with_problems(*found)

@@ -10,8 +10,9 @@ import numpy as np
 
 from weighbridge.constants import EARTH_RADIUS
 from weighbridge.messages import phrase
+from weighbridge.navigation.aiding import SLOWEST
 from weighbridge.signals import QUANTITIES, Drive, Floats, Problem, Signal
-from weighbridge.signals.catalogue import TABLES
+from weighbridge.signals.catalogue import IMU_SIGNALS, TABLES
 from weighbridge.signals.cleaning import NO_DRIVE
 from weighbridge.signals.instants import instant, span
 from weighbridge.signals.parts import find_splices
@@ -48,13 +49,24 @@ def check_rates(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
         period, name = s.period, f"{table} ({s.name})"
         slow, fast = (0.5, 5e-5) if table in ("imu", "ride") else (30.0, 5e-4)
         if slow < period < _SLOW_SENSOR and _as_long_as_speed(drive, s):
-            yield Problem.of("clock.slow_sensor", serious=True, table=name, period=period)
-        elif period > slow or (period > 2.0 and s.duration > 2 * 86_400.0):
+            continue
+        if period > slow or (period > 2.0 and s.duration > 2 * 86_400.0):
             yield Problem.of("clock.milliseconds", serious=True, table=name, period=period)
         elif table == "imu" and (packets := _packets(s, name)):
             yield packets
         elif period < fast:
             yield Problem.of("clock.seconds", serious=True, table=name, rate=1.0 / period)
+
+
+def without_slow(drive: Drive) -> Drive:
+    """Leave out an inertial sensor that is too slow to navigate by, where a speed is recorded."""
+    accel = drive.get(IMU_SIGNALS[0])
+    if not (drive.has("vehicle_speed") and drive.has(*IMU_SIGNALS)) or accel is None:
+        return drive
+    if len(accel) < 2 or accel.period <= SLOWEST:
+        return drive
+    left_out = Problem.of("imu.slow_out", accel.name, period=accel.period)
+    return drive.without(*IMU_SIGNALS).with_problems(left_out)
 
 
 def _packets(signal: Signal, table: str) -> Problem | None:

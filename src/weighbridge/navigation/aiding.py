@@ -32,8 +32,10 @@ _REACH = 3.0
 _AT_ONCE = 1 << 12
 """Outputs low-passed at a time: their samples stay in the processor's cache."""
 
-_SLOWEST = 0.11
-"""Inertial samples further apart lose what happens between them [s]."""
+SLOWEST = 0.11
+"""Inertial samples further apart lose what happens between them [s]. Twelve cars and vans with a
+sensor of 5 Hz scattered by 3.2 % (OBD at 4 Hz) and 7.4 % (1 Hz) with it, and 2.7 and 3.8 % without
+it (studies/car_equipment.md)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,7 +116,7 @@ def read_imu(drive: Drive) -> Imu:
         moving = interpolate(time, speed.time, speed.values) > _MOVES
     usual = signals[0].period if whole else float(np.median(np.diff(time)))
     imu = Imu(time, accel, gyro, usual)
-    if imu.period > _SLOWEST:
+    if imu.period > SLOWEST:
         raise refused("imu.slow", drive=drive.name, period=imu.period)
     false = false_rows(imu.accel, imu.gyro, moving)
     if not false.any() or time[-1] - time[0] < _BRIEF:
