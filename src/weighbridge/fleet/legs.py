@@ -40,13 +40,14 @@ class Limits(NamedTuple):
     ----------
     warn, alarm : least probabilities that the mass is above the permitted one
     empty : payload below this part of the permitted payload is none [-]
-    trailer : least probability of a trailer that is reported, where no coupling is known
+    trailer : least probability of a trailer that is reported, where no coupling is known; of 139
+        legs of trucks without one that the law was tuned on, none reached 0.6
     """
 
     warn: float = 0.5
     alarm: float = 0.95
     empty: float = 0.1
-    trailer: float = 0.9
+    trailer: float = 0.8
 
 
 def check_limits(limits: Limits) -> None:

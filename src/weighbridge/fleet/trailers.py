@@ -78,10 +78,7 @@ def with_trailers(legs: pl.DataFrame) -> pl.DataFrame:
     found = np.full(legs.height, np.nan)
     for own in rows.partition_by("vehicle_id", "vehicle_digest"):
         found[own["_row"].to_numpy()] = _probabilities(own)
-    column = pl.Series("trailer_probability", found).fill_nan(None)
-    return legs.with_columns(
-        trailer_probability=pl.when(pl.col("coupled")).then(1.0).otherwise(column)
-    )
+    return legs.with_columns(pl.Series("trailer_probability", found).fill_nan(None))
 
 
 def _probabilities(legs: pl.DataFrame) -> Floats:
