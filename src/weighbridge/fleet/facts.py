@@ -9,9 +9,12 @@ from typing import Any, Final
 
 import numpy as np
 
+from weighbridge.balance.wheel_slip import wheel_slip
 from weighbridge.estimators import Segment, Status
+from weighbridge.estimators.joint.drag_area import shown_drag_area
 from weighbridge.fleet.schema import CHECKS
 from weighbridge.fleet.spans import Span, spans_of
+from weighbridge.fleet.trailers import SHOWN
 from weighbridge.fleet.travel import Travel
 from weighbridge.messages import Problem
 from weighbridge.pipeline.weighing import Weighing
@@ -114,9 +117,20 @@ def row_of(weighed: Weighing) -> dict[str, Any]:
         "load_changed": weighed.load_changed,
         "freedom": None if result is None else float(result.degrees_of_freedom),
         "systematic_std_kg": None if result is None else _number(float(result.systematic_std)),
+        **_beside(weighed),
         "known_mass_kg": drive.info.mass,
         "signals": sorted(drive.signals),
     }
+
+
+def _beside(weighed: Weighing) -> dict[str, Any]:
+    """Return what shows a trailer beside the mass: drag area and slip of the driven wheels."""
+    result = weighed.result
+    area, slip = shown_drag_area(result), None
+    if result is not None and result.mass > 0.0:
+        slip = wheel_slip(result.balance.table, result.mass, weighed.drive)
+    found = (*(area or (None,) * 2), *(slip or (None,) * 5))
+    return dict(zip(SHOWN, found, strict=True))
 
 
 def of_vehicle(vehicle: Vehicle) -> dict[str, Any]:

@@ -20,7 +20,8 @@ def keep_legs(results: Results) -> None:
     """Bring the table of legs in line with the tables of drives and segments, day by day.
 
     A day is made anew where one of its files, or what was learnt, is not older than its legs. Legs
-    and drives of a day are of the same drives, so no other day is read.
+    and drives of a day are of the same drives, so no other day is read. The probability of a
+    trailer is that by the legs of the day.
 
     Parameters
     ----------

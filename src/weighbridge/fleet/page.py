@@ -347,7 +347,7 @@ def how_sure(probability: float) -> str:
 
 
 def _towing(leg: dict[str, Any]) -> str:
-    """Return a trailer that is known, or guessed from the mass alone."""
+    """Return a trailer that is known, or probable by mass, drag area and slip."""
     return ", with trailer" if leg["coupled"] else ", trailer?" if leg["trailer"] else ""
 
 

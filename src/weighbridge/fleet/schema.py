@@ -11,13 +11,13 @@ from typing import Final, NamedTuple
 
 import polars as pl
 
-FORMAT_VERSION: Final = 5
+FORMAT_VERSION: Final = 6
 """Version of the tables; part of every key, so that another one weighs anew."""
 
-READABLE: Final = (2, 3, 4, FORMAT_VERSION)
-"""Versions that can be read. Before 5, rows lack the digest of the vehicle file. Before 4, a
-recording was known by its content alone and ``start`` was a text; tables of 2 lack ids of
-messages."""
+READABLE: Final = (2, 3, 4, 5, FORMAT_VERSION)
+"""Versions that can be read. Before 6, rows lack drag area and wheel slip. Before 5, they lack the
+digest of the vehicle file. Before 4, a recording was known by its content alone and ``start`` was a
+text; tables of 2 lack ids of messages."""
 
 DAY: Final = "day"
 """Name of the partitions: no column of the tables has it, so that no reader finds two types."""
@@ -91,6 +91,13 @@ DRIVES: Final[dict[str, Column]] = {
     "distance_km": Column(_NUMBER, "driven, from the speed"),
     "moving_s": Column(_NUMBER, "time in which the vehicle moved"),
     "systematic_std_kg": Column(_NUMBER, "part of std_kg that all drives of the vehicle share"),
+    "drag_area_m2": Column(_NUMBER, "C_d A above the vehicle file's, as this drive alone shows it"),
+    "drag_area_std_m2": Column(_NUMBER, "its standard deviation"),
+    "slip": Column(_NUMBER, "slip of the driven wheels per traction over the weight"),
+    "slip_std": Column(_NUMBER, "its standard deviation"),
+    "late_s": Column(_NUMBER, "how much later the GNSS speed is than that of the engine"),
+    "late_std_s": Column(_NUMBER, "its standard deviation"),
+    "slip_late": Column(_NUMBER, "correlation of the errors of slip and late_s"),
     "first_mass_s": Column(_NUMBER, "from the first motion to a running mass within 10 %, 1 std"),
     "checked_kg": Column(_NUMBERS, "running mass 15 min after the first motion, then every 10 min"),
     "checked_std_kg": Column(_NUMBERS, "its standard deviations; null where there was none yet"),
@@ -164,7 +171,8 @@ LEGS: Final[dict[str, Column]] = {
     "gross_kg": DRIVES["gross_kg"],
     "permitted_kg": Column(_NUMBER, "permitted mass, with a trailer that is known to be coupled"),
     "coupled": Column(pl.Boolean(), "a table of couplings names a trailer"),
-    "trailer": Column(pl.Boolean(), "coupled, or taken for one by the mass"),
+    "trailer_probability": Column(_NUMBER, "of a trailer; 1 if coupled, null if it is not known"),
+    "trailer": Column(pl.Boolean(), "coupled, or the probability of a trailer is high"),
     "overload": Column(_NUMBER, "probability that the mass is above the permitted one"),
     "level": Column(_TEXT, "ok, warn (likely) or alarm (sure); null where overload is"),
     "empty": Column(pl.Boolean(), "payload below a tenth of the permitted one"),

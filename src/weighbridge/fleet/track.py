@@ -53,12 +53,12 @@ def track(legs: pl.DataFrame, limits: Limits | None = None) -> pl.DataFrame:
             scale=(pl.col("weight") * pl.col("scale")).sum() / pl.col("weight").sum(),
             tare=pl.col("tare_kg").drop_nulls().last(),
             gross=pl.col("gross_kg").drop_nulls().last(),
-            coupled=pl.col("coupled").any(),
+            towed=pl.col("trailer").any(),
         )
     )
     payload = pl.col("mass_kg") - pl.col("tare")
     state = (
-        pl.when(pl.col("coupled") | (pl.col("mass_kg") > limits.trailer * pl.col("gross")))
+        pl.when(pl.col("towed"))
         .then(pl.lit("trailer"))
         .when(payload < limits.empty * (pl.col("gross") - pl.col("tare")))
         .then(pl.lit("empty"))

@@ -101,8 +101,8 @@ def beside_speed(drive: Drive) -> tuple[Problem, ...]:
 
 
 FAR_ABOVE: Final = 1.25
-"""Above so much of the permitted mass a trailer is as likely as a load, as of legs of a fleet, or
-the vehicle file another's [-]."""
+"""Above so much of the permitted mass a trailer is as likely as a load, or the vehicle file
+another's [-]."""
 
 SMALL: Final = 4.0
 """The usual mass of a class over that of its lightest vehicles [-]: cars of 0.4 t and trucks of

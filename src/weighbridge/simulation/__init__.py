@@ -24,6 +24,7 @@ from weighbridge.simulation.scenario import (
     Sensors,
 )
 from weighbridge.simulation.simulate import SimulatedDrive, Truth, simulate_car
+from weighbridge.simulation.trailer import Trailer, random_trailer
 from weighbridge.simulation.vehicles import (
     BUS,
     DIESEL_AUTOMATIC,
@@ -56,6 +57,7 @@ __all__ = [
     "Sensors",
     "SimulatedCar",
     "SimulatedDrive",
+    "Trailer",
     "Truth",
     "VehicleKind",
     "bus_route",
@@ -68,6 +70,7 @@ __all__ = [
     "plan_fleet",
     "random_car",
     "random_habits",
+    "random_trailer",
     "random_vehicle",
     "short_route",
     "simulate_car",

@@ -103,13 +103,18 @@ def simulate_pose(scenario: Scenario, drive: Trajectory, rng: np.random.Generato
     lateral = second_order(v * v * np.interp(s, grid, route.curvature), 3.0, 0.9, zero=False)
     accel = np.gradient(v, DT)
     payload = scenario.payload + (drive.loaded if scenario.loading else 0.0)
-    lever = car.squat * effects.squat * (1.0 + car.squat_load * payload / car.mass)
+    # A coupling pulls lower than a load on the bed, and its own load is far behind the axle.
+    pulled, pitching = payload, payload
+    if (trailer := scenario.trailer) is not None:
+        pulled = payload + trailer.hitch_pull * trailer.mass
+        pitching = payload + trailer.hitch_pitch * trailer.hitch_load * trailer.mass
+    lever = car.squat * effects.squat * (1.0 + car.squat_load * pulled / car.mass)
     force = accel + GRAVITY * np.sin(grade)
     squat = second_order(force * lever, car.pitch_frequency, 0.45, zero=False)
     body_roll = second_order(
         lateral * (-car.roll_gain * effects.roll), car.roll_frequency, 0.35, zero=False
     )
-    pitch = grade + squat + car.load_pitch * payload * effects.load_pitch
+    pitch = grade + squat + car.load_pitch * pitching * effects.load_pitch
     roll = second_order(np.interp(s, grid, route.bank), 3.0, 0.7, zero=False) + body_roll
     heave = np.zeros_like(s)
     if effects.roughness > 0.0:

@@ -21,6 +21,7 @@ from weighbridge.simulation.named import TORQUE_POLLING, usual_polling
 from weighbridge.simulation.route import RoadKind, Route, mixed_route
 from weighbridge.simulation.scenario import Loading, Scenario, Sensors
 from weighbridge.simulation.simulate import SimulatedDrive, simulate_car
+from weighbridge.simulation.trailer import Trailer, random_trailer
 from weighbridge.simulation.vehicles import BUS, random_habits, random_vehicle, with_random_details
 
 Kind = Literal["truck", "van", "bus", "car"]
@@ -36,8 +37,8 @@ _GROSS: Final[dict[Kind, float]] = {"truck": 2.0, "van": 1.67, "bus": 1.75, "car
 """Permitted mass over the empty one [-]: 18 t, 3.5 t, 12.3 t and 2.1 t of the named vehicles."""
 
 _ORDER: Final[tuple[Kind, ...]] = ("truck", "van", "truck", "bus", "car")
-_TRAILER: Final = (0.6, 1.0)  # mass of a trailer over that of the empty truck [-]
-_SHARE: Final = {"overload": 0.08, "empty": 0.25, "stop": 0.2, "trailer": 0.1, "fault": 0.04}
+_SHARE: Final = {"overload": 0.08, "empty": 0.25, "stop": 0.2, "fault": 0.04}
+_SLIP_SCATTER: Final = 0.2  # of the tyres' slip, from drive to drive, relative [-]; chosen
 _TICKETS: Final = 0.3  # part of the departures that go over a weighbridge [-]
 _NO_FILE: Final = 10  # every tenth vehicle has no file
 _DRIFTING: Final = 3  # every third vehicle, where a drift is asked for
@@ -57,6 +58,7 @@ class FleetSettings:
     minutes : length of a drive
     seed : of everything random
     start : first day, ISO 8601
+    trailers : part of the drives of trucks with a trailer [-]
     drift : how much more torque every third vehicle reads on its last day than on its first, even
         in between; its true torque stays [-]
     """
@@ -67,6 +69,7 @@ class FleetSettings:
     minutes: float = 20.0
     seed: int = 1
     start: str = "2026-05-04"
+    trailers: float = 0.1
     drift: float = 0.0
 
     def __post_init__(self) -> None:
@@ -76,6 +79,8 @@ class FleetSettings:
                 raise ConfigError(f"{name} must be 1 to {high}, got {value}")
         if not 2.0 <= self.minutes <= 120.0:
             raise ConfigError(f"minutes must be 2 to 120, got {self.minutes:g}")
+        if not 0.0 <= self.trailers <= 1.0:
+            raise ConfigError(f"trailers must be in [0, 1], got {self.trailers:g}")
         if not abs(self.drift) <= 0.5:
             raise ConfigError(f"drift must be -50 to 50 %, got {100.0 * self.drift:g} %")
         if self.drives * (self.minutes + 20.0) > 24 * 60:
@@ -115,9 +120,9 @@ class PlannedDay:
     vehicle
     seed : of the drives
     starts : when each begins
-    payloads : at each start, a trailer included [kg]
+    payloads : at each start, of the vehicle itself [kg]
     stops : load taken on at a stop halfway; 0 where there is none [kg]
-    trailers : mass of a trailer, 0 without one [kg]
+    trailers : behind it; None without one
     tickets : whether the departure was weighed
     faults : of each recording
     minutes : length of a drive
@@ -129,7 +134,7 @@ class PlannedDay:
     starts: tuple[datetime, ...]
     payloads: tuple[float, ...]
     stops: tuple[float, ...]
-    trailers: tuple[float, ...]
+    trailers: tuple[Trailer | None, ...]
     tickets: tuple[bool, ...]
     faults: tuple[Fault, ...]
     minutes: float
@@ -258,8 +263,8 @@ def _day(
             load = room + vehicle.gross * float(rng.uniform(0.08, 0.3))
         elif chance[1] < _SHARE["empty"]:
             load = 0.0
-        towed = vehicle.kind == "truck" and chance[2] < _SHARE["trailer"]
-        trailer = vehicle.car.mass * float(rng.uniform(*_TRAILER)) if towed else 0.0
+        towed = vehicle.kind == "truck" and chance[2] < settings.trailers
+        trailer = random_trailer(rng, vehicle.car.mass) if towed else None
         load = min(load, 0.9 * room) if towed else load
         stop = 0.0
         if chance[3] < _SHARE["stop"] and settings.minutes >= 10.0:
@@ -268,9 +273,9 @@ def _day(
         if chance[4] < _SHARE["fault"]:
             fault = FAULTS[int(rng.integers(len(FAULTS)))]
         starts.append(begin)
-        payloads.append(round(load + trailer))
+        payloads.append(round(load))
         stops.append(round(stop))
-        trailers.append(round(trailer))
+        trailers.append(trailer)
         faults.append(fault)
         tickets.append(bool(rng.uniform() < _TICKETS))
         begin += timedelta(minutes=round(settings.minutes + float(rng.uniform(8.0, 20.0))))
@@ -305,6 +310,7 @@ def _scenario(
         car=vehicle.car,
         route=route,
         payload=day.payloads[number],
+        trailer=day.trailers[number],
         loading=(halfway,) if stop else (),
         seed=int(rng.integers(2**31)),
         habits=random_habits(rng),
@@ -313,7 +319,7 @@ def _scenario(
         wind_speed=float(rng.uniform(0.0, 6.0)),
         wind_from=float(rng.uniform(0.0, 2.0 * math.pi)),
         ambient_temperature=float(rng.uniform(275.0, 298.0)),
-        drag_area_addition=1.5 if day.trailers[number] else 0.0,
+        slip_factor=math.exp(_SLIP_SCATTER * float(rng.standard_normal())),
         start_rest=15.0,
         duration=seconds,
         start_time=start.isoformat(),

@@ -41,6 +41,7 @@ TRUTH: Final = {
     "tare_kg": pl.Float64(),
     "gross_kg": pl.Float64(),
     "trailer_kg": pl.Float64(),
+    "trailer": pl.String(),
     "fault": pl.String(),
     "torque_scale": pl.Float64(),
 }
@@ -161,7 +162,7 @@ def _write_day(part: Path, day: PlannedDay) -> _Made:
     tickets: list[dict[str, Any]] = []
     vehicle = day.vehicle
     for number, made in enumerate(simulate_day(day)):
-        fault, start = day.faults[number], day.starts[number]
+        fault, start, trailer = day.faults[number], day.starts[number], day.trailers[number]
         inside = f"drives/{vehicle.id}/{made.drive.name}"
         info = replace(made.drive.info, mass=None, notes=None, vehicle=vehicle.id)
         read = with_torque_scale(made.drive, day.torque_scale)
@@ -179,7 +180,8 @@ def _write_day(part: Path, day: PlannedDay) -> _Made:
                     "start": start.isoformat(),
                     "tare_kg": round(vehicle.car.mass),
                     "gross_kg": vehicle.gross,
-                    "trailer_kg": day.trailers[number],
+                    "trailer_kg": trailer.mass if trailer else 0.0,
+                    "trailer": trailer.kind if trailer else "",
                     "fault": fault,
                     "torque_scale": day.torque_scale,
                 }

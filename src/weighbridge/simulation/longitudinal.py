@@ -211,7 +211,8 @@ def _powertrain(scenario: Scenario) -> Powertrain:
         curve_speed=np.array(car.curve_speed),
         curve_torque=np.array(car.curve_torque),
         engine_inertia=car.engine_inertia,
-        wheel_mass=car.wheel_inertia / car.wheel_radius**2,
+        wheel_mass=car.wheel_inertia / car.wheel_radius**2
+        + (scenario.trailer.wheel_mass if scenario.trailer else 0.0),
         idle_speed=car.idle_speed,
         max_speed=car.max_speed,
         drag_torque=np.array(car.drag_torque),
@@ -249,23 +250,30 @@ def _powertrain(scenario: Scenario) -> Powertrain:
 
 
 def _resistance(scenario: Scenario) -> kernel.Resistance:
-    car, effects = scenario.car, scenario.effects
+    car, effects, trailer = scenario.car, scenario.effects, scenario.trailer
     density = scenario.pressure / (GAS_CONSTANT_DRY_AIR * scenario.ambient_temperature)
     colder = _REFERENCE_TEMPERATURE - scenario.ambient_temperature
-    rolling = car.rolling_coefficient * scenario.tyre_factor
+    rolling, drag_area = car.rolling_coefficient, car.drag_area
+    if trailer is not None:
+        behind = 1.0 - scenario.carried / scenario.mass
+        rolling += behind * (trailer.rolling_coefficient - rolling)
+        drag_area += trailer.drag_area
+    rolling *= scenario.tyre_factor
     rolling *= 1.0 + effects.tyre_temperature * car.tyre_cooling * colder
     height = math.log(car.wind_height / ROUGHNESS_LENGTH) / math.log(10.0 / ROUGHNESS_LENGTH)
     wind = scenario.wind_speed * height
     return kernel.Resistance(
         mass=scenario.mass,
-        drag_area=car.drag_area + scenario.drag_area_addition,
+        drag_area=drag_area + scenario.drag_area_addition,
         yaw_drag=car.yaw_drag * effects.yaw_drag,
         rolling=rolling,
         rolling_speed=0.20 * effects.tyre_speed,
         rolling_cold=0.22 * effects.warm_up,
         warm_up_time=car.warm_up_time,
         cornering=0.005 * effects.cornering_drag,
-        tyre_slip=car.tyre_slip / (scenario.mass * GRAVITY) * effects.tyre_slip,
+        tyre_slip=car.tyre_slip
+        * (scenario.slip_factor / (scenario.carried * GRAVITY))
+        * effects.tyre_slip,
         density=density,
         density_height=GAS_CONSTANT_DRY_AIR * scenario.ambient_temperature / GRAVITY,
         wind_north=-wind * math.cos(scenario.wind_from),

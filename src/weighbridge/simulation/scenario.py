@@ -11,6 +11,7 @@ from weighbridge.arguments import check_choice, suggestion
 from weighbridge.errors import ConfigError
 from weighbridge.simulation.car import SimulatedCar
 from weighbridge.simulation.route import Route
+from weighbridge.simulation.trailer import Trailer
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -350,7 +351,8 @@ class Scenario:
     ----------
     name : becomes the drive's name
     car, route : what drives where
-    payload : at the start, beside driver and fuel [kg]
+    payload : at the start, on the vehicle itself, beside driver and fuel [kg]
+    trailer : behind it; None without
     loading : stops at which the load changes, rising in distance
     brakings : at times, beside those the road asks for
     seed : of driver, weather and sensors; the route keeps its own
@@ -362,6 +364,7 @@ class Scenario:
     ambient_temperature : [K]
     pressure : of the air at the route's start [Pa]
     tyre_factor : of the rolling resistance, for tyre pressure [-]
+    slip_factor : of the slip of the driven tyres, for their temperature and the surface [-]
     drag_area_addition : for open windows or a roof box [m^2]
     aggressiveness : of the driver, 1 usual [-]
     calibration : drive every gear, load and engine speed, not just as usual
@@ -381,6 +384,7 @@ class Scenario:
     car: SimulatedCar
     route: Route
     payload: float = 0.0
+    trailer: Trailer | None = None
     loading: tuple[Loading, ...] = ()
     brakings: tuple[Braking, ...] = ()
     seed: int = 0
@@ -394,6 +398,7 @@ class Scenario:
     ambient_temperature: float = 283.15
     pressure: float = 101_325.0
     tyre_factor: float = 1.0
+    slip_factor: float = 1.0
     drag_area_addition: float = 0.0
     aggressiveness: float = 1.0
     calibration: bool = False
@@ -420,6 +425,7 @@ class Scenario:
             ("ambient_temperature", 223.0, 333.0),
             ("pressure", 6e4, 1.1e5),
             ("tyre_factor", 0.1, 5.0),
+            ("slip_factor", 0.1, 5.0),
             ("aggressiveness", 0.3, 3.0),
             ("start_rest", 0.0, 3600.0),
         ):
@@ -431,8 +437,14 @@ class Scenario:
 
     @property
     def mass(self) -> float:
-        """Mass at the start: car, driver, fuel and payload [kg]."""
-        return self.car.mass + self.payload
+        """Mass at the start: car, driver, fuel, payload and trailer [kg]."""
+        return self.car.mass + self.payload + (self.trailer.mass if self.trailer else 0.0)
+
+    @property
+    def carried(self) -> float:
+        """What of it the vehicle's own wheels carry at the start [kg]."""
+        hitch = self.trailer.hitch_load * self.trailer.mass if self.trailer else 0.0
+        return self.car.mass + self.payload + hitch
 
 
 def streams(seed: int, *names: str) -> dict[str, np.random.Generator]:
