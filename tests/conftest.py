@@ -197,13 +197,21 @@ def assert_damage_is_told(
     return check
 
 
-@pytest.fixture
-def browser():
-    """Headless Chromium of playwright; skips where one of them is not installed."""
+@pytest.fixture(scope="module")
+def chromium():
+    """Headless Chromium of playwright, one for a file of tests."""
     sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
     if CHROMIUM is None:
         pytest.skip("no Chromium is installed")
     with sync_api.sync_playwright() as play:
-        chromium = play.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-        yield chromium
-        chromium.close()
+        started = play.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+        yield started
+        started.close()
+
+
+@pytest.fixture
+def browser(chromium):
+    """Browser without a page of an earlier test; skips where none is installed."""
+    yield chromium
+    for context in chromium.contexts:
+        context.close()

@@ -18,6 +18,14 @@ from xml.etree import ElementTree
 ROOT = Path(__file__).resolve().parents[1]
 LIST = ROOT / "tests" / "order.csv"
 LONG = ROOT / "tests" / "long.toml"
+STARTING = (
+    "cli/test_fleet_command.py",
+    "fleet/test_learning.py",
+    "unit/test_fault_study.py",
+    "unit/test_simulated_fleet.py",
+)
+"""Files whose tests start processes through the program; each takes up to 400 MB."""
+
 UNKNOWN = 10.0
 """Taken by `.ci/quick` for a file that is not on the list [s]."""
 
@@ -37,7 +45,9 @@ def longest_first(items: list) -> None:
     starting = {
         item.path
         for item in items
-        if "browser" in item.fixturenames or hasattr(item.module, "subprocess")
+        if "browser" in item.fixturenames
+        or hasattr(item.module, "subprocess")
+        or item.path.as_posix().endswith(STARTING)
     }
     items.sort(
         key=lambda item: (

@@ -21,7 +21,9 @@ INSTEAD: dict[str, str] = tomllib.loads(
 )
 """Expressions of private words, with what to write in their place."""
 
-_PRIVATE = re.compile("|".join(rf"(?<![.\w])(?:{word})\b" for word in INSTEAD), re.IGNORECASE)
+_PRIVATE = re.compile(
+    rf"(?<![.\w])(?:{'|'.join(f'(?:{word})' for word in INSTEAD)})\b", re.IGNORECASE
+)
 _CODE = re.compile(r"``[^`]+``|`[^`\n]+`|\]\([^)\s]*\)|https?://\S+")
 _VALUE = re.compile(r"\{[^{}\n]*\}|^\[[^\]\n]*\]$", re.MULTILINE)
 _NAMES = re.compile(r"^[\w, *]+ : ", re.MULTILINE)
@@ -48,13 +50,11 @@ def sentences() -> Iterator[tuple[str, str]]:
     """Yield place and text of the literals of the program that have a blank: its sentences."""
     for path in sorted(SOURCE.rglob("*.py")):
         tree = ast.parse(path.read_text(encoding="utf-8"))
-        described = {
-            id(line.value)
-            for node in ast.walk(tree)
-            for line in (node.body if isinstance(getattr(node, "body", None), list) else ())
-            if isinstance(line, ast.Expr)
-        }
+        described = set()
+        # What holds a docstring comes before it.
         for node in ast.walk(tree):
+            if isinstance(body := getattr(node, "body", None), list):
+                described |= {id(line.value) for line in body if isinstance(line, ast.Expr)}
             if not isinstance(node, ast.Constant) or id(node) in described:
                 continue
             if isinstance(node.value, str) and " " in node.value:

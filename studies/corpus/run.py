@@ -13,7 +13,7 @@ from typing import Any, Final
 
 import polars as pl
 from studies.corpus.pairs import Pair, calibrated
-from studies.corpus.subjects import subject
+from studies.corpus.subjects import READ, subject
 
 import weighbridge as wb
 from weighbridge.errors import WeighbridgeError
@@ -106,7 +106,8 @@ def _shared_out(work: Callable[[Any], Any], jobs: Sequence[Any], workers: int) -
 
 def run(pairs: Sequence[Pair], workers: int = WORKERS) -> pl.DataFrame:
     """Calibrate and weigh in so many processes; rows are in the order of the pairs."""
-    _shared_out(_prepare, sorted({p.of for p in pairs if p.of}), workers)
+    made = {p.of for p in pairs if p.of and p.of not in READ}
+    _shared_out(_prepare, sorted(made), workers)
     wanted = sorted({(p.of, p.equipment) for p in pairs if p.equipment})
     vehicles = dict(zip(wanted, _shared_out(_calibrate, wanted, workers), strict=True))
     jobs = [

@@ -19,6 +19,9 @@ from weighbridge.simulation import Sensors, make_scenario, simulate_car
 
 TERMINAL = {"TERM": "xterm-256color", "COLUMNS": "90"}
 
+SHORT = 480.0
+"""Of the drives that are weighed again and again [s]."""
+
 
 class Made(NamedTuple):
     """A simulated drive on disk."""
@@ -48,7 +51,7 @@ def known(tmp_path_factory) -> Made:
 @pytest.fixture(scope="session")
 def loaded(tmp_path_factory) -> Made:
     """Return a drive of the same car with 150 kg more."""
-    return _made(tmp_path_factory.mktemp("loaded") / "loaded", "car-short", 102, 150.0, None)
+    return _made(tmp_path_factory.mktemp("loaded") / "loaded", "car-short", 102, 150.0, SHORT)
 
 
 @pytest.fixture(scope="session")

@@ -1,5 +1,6 @@
 """Scales of a fleet's vehicles, found without tickets, through runs and reports."""
 
+import copy
 import math
 import shutil
 from dataclasses import replace
@@ -37,9 +38,21 @@ class Fleet:
     """Vehicle files, results with rows as a run writes them, and one drive for a run to find."""
 
     def __init__(self, home):
-        self.cars, self.drives, self.results = home / "cars", home / "drives", home / "results"
-        self.home, self.true = home, {}
+        self.true = {}
+        self.settle(home)
         self.cars.mkdir()
+
+    def settle(self, home):
+        self.cars, self.drives, self.results = home / "cars", home / "drives", home / "results"
+        self.home = home
+
+    def copied(self, home):
+        """Return the same fleet in a folder that a test may change."""
+        shutil.copytree(self.home, home)
+        other = copy.copy(self)
+        other.true = dict(self.true)
+        other.settle(home)
+        return other
 
     def add(
         self, name, true, weighed, *, kind="tipper", tare=TARE, gross=GROSS, stated=STATED,
@@ -91,17 +104,32 @@ class Fleet:
 SCALES = (0.05, 0.06, 0.045, 0.055, 0.065, 0.05)
 
 
-@pytest.fixture
-def fleet(tmp_path):
+@pytest.fixture(scope="module")
+def fleet(tmp_path_factory):
     """Six trucks of one type that weigh 5 % too heavy, and a seventh with a crane aboard."""
-    made = Fleet(tmp_path)
+    made = Fleet(tmp_path_factory.mktemp("fleet"))
     for k, scale in enumerate(SCALES):
         made.add(f"truck{k}", *runs(k, scale))
     made.add("crane", *runs(9, 0.05, always=1300.0))
     return made
 
 
-def test_masses_are_corrected_by_empty_runs_and_by_what_a_type_shares(fleet, scheduler):
+@pytest.fixture(scope="module")
+def learnt_once(fleet, scheduler, tmp_path_factory):
+    """The fleet of which a run has learnt; not to be changed."""
+    taught = fleet.copied(tmp_path_factory.mktemp("learnt") / "fleet")
+    taught.learn(scheduler)
+    return taught
+
+
+@pytest.fixture
+def taught(learnt_once, tmp_path):
+    """The fleet of which a run has learnt, in a folder of the test."""
+    return learnt_once.copied(tmp_path / "fleet")
+
+
+def test_masses_are_corrected_by_empty_runs_and_by_what_a_type_shares(fleet, tmp_path, scheduler):
+    fleet = fleet.copied(tmp_path / "fleet")
     legs, learnt = fleet.learn(scheduler, learn=None)
     assert (len(learnt), legs["factor"].null_count()) == (0, legs.height)
     legs, learnt = fleet.learn(scheduler)
@@ -129,8 +157,8 @@ def test_masses_are_corrected_by_empty_runs_and_by_what_a_type_shares(fleet, sch
     assert kept.sort("key").equals(shown.select(kept.columns).sort("key"))
 
 
-def test_a_vehicle_that_is_never_empty_is_not_shifted_by_its_lightest_runs(fleet, scheduler):
-    legs, learnt = fleet.learn(scheduler)
+def test_a_vehicle_that_is_never_empty_is_not_shifted_by_its_lightest_runs(learnt_once):
+    legs, learnt = learnt_once.told()
     row = learnt["crane"]
     assert row["factor_reason_id"] in ("fleet.scale_wrong", "fleet.scale_never")
     assert row["verdict"] == "never empty"
@@ -138,10 +166,9 @@ def test_a_vehicle_that_is_never_empty_is_not_shifted_by_its_lightest_runs(fleet
     assert abs(legs.filter(pl.col("vehicle_id") == "crane")["error"].mean()) < 0.02
 
 
-def test_transport_and_overload_are_those_of_the_corrected_masses(fleet, scheduler):
+def test_transport_and_overload_are_those_of_the_corrected_masses(fleet, learnt_once):
     before = wb.fleet.report(fleet.results)
-    fleet.learn(scheduler)
-    after = wb.fleet.report(fleet.results)
+    after = wb.fleet.report(learnt_once.results)
     true = sum(1e-3 * (mass - TARE) * 20.0 for mass in fleet.true.values())
     assert before.totals["tkm"] > 1.1 * true
     assert after.totals["tkm"] == pytest.approx(true, rel=0.06)
@@ -163,6 +190,7 @@ def test_transport_and_overload_are_those_of_the_corrected_masses(fleet, schedul
 
 
 def test_the_order_of_rows_and_a_run_that_is_continued_change_nothing(fleet, tmp_path, scheduler):
+    fleet = fleet.copied(tmp_path / "fleet")
     fleet.learn(scheduler)
     first = pl.read_parquet(fleet.results / "learnt.parquet")
     (tmp_path / "other").mkdir()
@@ -189,8 +217,8 @@ def test_the_order_of_rows_and_a_run_that_is_continued_change_nothing(fleet, tmp
     assert after.equals(before)
 
 
-def test_known_masses_are_compared_with_what_was_weighed(fleet, tmp_path, scheduler):
-    fleet.learn(scheduler)
+def test_known_masses_are_compared_with_what_was_weighed(learnt_once, tmp_path):
+    fleet = learnt_once
     tickets = tmp_path / "tickets.csv"
     known, when = fleet.true["truck4-003"], BEGIN + timedelta(hours=9, minutes=5)
     tickets.write_text(f"vehicle,time,mass_kg\ntruck4,{when.isoformat()},{known:.0f}\n")
@@ -226,8 +254,9 @@ def test_a_ticket_for_each_drive_of_a_year_leaves_a_number():
         assert 0.0 < scale.std < 0.02
 
 
-def test_what_was_learnt_is_written_anew_where_it_is_damaged(fleet, scheduler):
-    _, learnt = fleet.learn(scheduler)
+def test_what_was_learnt_is_written_anew_where_it_is_damaged(taught, scheduler):
+    fleet = taught
+    _, learnt = fleet.told()
     (fleet.results / "learnt.parquet").write_bytes(b"no table")
     _, again = fleet.learn(scheduler)
     assert again == learnt
@@ -262,8 +291,9 @@ def test_little_is_learnt_from_little(tmp_path, scheduler):
         assert learnt[f"loaded{k}"]["factor_std"] > 0.8 * STATED
 
 
-def test_a_factor_is_of_the_vehicle_file_that_it_was_learnt_of(fleet, scheduler):
-    legs, _ = fleet.learn(scheduler)
+def test_a_factor_is_of_the_vehicle_file_that_it_was_learnt_of(taught, scheduler):
+    fleet = taught
+    legs, _ = fleet.told()
     assert legs["factor"].null_count() == 0
     # Weighed again with a file that calibration changed, before anything is learnt of it.
     fleet.add("truck1", *runs(1, 0.0), kind="calibrated")
@@ -281,8 +311,8 @@ def test_a_factor_is_of_the_vehicle_file_that_it_was_learnt_of(fleet, scheduler)
     assert "truck0" not in learnt
 
 
-def test_what_an_earlier_version_learnt_is_read(fleet, scheduler):
-    fleet.learn(scheduler)
+def test_what_an_earlier_version_learnt_is_read(taught):
+    fleet = taught
     path = Path(fleet.results / "learnt.parquet")
     lacks = [n for n in pl.read_parquet(path).columns if n.startswith(("factor", "vehicle_d"))]
     pl.read_parquet(path).drop(*lacks, "type").write_parquet(path)

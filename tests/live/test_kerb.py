@@ -9,8 +9,10 @@ import pytest
 import weighbridge as wb
 from weighbridge.estimators.tilt import Learnt, TiltMap
 from weighbridge.live.kerb import LIGHTS, Kerb, Weighed
-from weighbridge.live.questions import PROVED
 from weighbridge.signals import Drive, Signal
+
+PROVED = 120.0
+"""On the move, after which a mass of before a silence counts without a report [s]."""
 
 PITCH = 0.1
 RATE = 20.0

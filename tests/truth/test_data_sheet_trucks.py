@@ -36,7 +36,7 @@ def weighed():
     found = []
     for k, seed in enumerate(SEEDS):
         scenario = make_scenario("truck", seed=seed, mass=9500.0 + 3000.0 * k)
-        made = simulate_car(replace(scenario, sensors=Sensors(imu_rate=50.0), duration=3000.0))
+        made = simulate_car(replace(scenario, sensors=Sensors(imu_rate=50.0), duration=1800.0))
         weighing = wb.weigh(made.drive, data_sheet(made.scenario.car))
         found.append((weighing, float(made.truth.mass[-1])))
     return found

@@ -1,6 +1,7 @@
-"""No module imports what imports it."""
+"""No module imports what imports it, and tests import no more of the inside than they say."""
 
 import ast
+import re
 from graphlib import TopologicalSorter
 from pathlib import Path
 
@@ -9,6 +10,8 @@ import pytest
 import weighbridge
 
 ROOT = Path(weighbridge.__file__).parent
+TESTS = Path(__file__).parents[1]
+GUIDE = TESTS.parent / "CONTRIBUTING.md"
 
 
 def modules():
@@ -46,3 +49,14 @@ def test_a_circle_is_seen():
     assert set(imported(here, {"a", "a.b", "a.d"})) == {"a.b", "a.d"}
     with pytest.raises(ValueError, match="cycle"):
         TopologicalSorter({"a": {"b"}, "b": {"a"}}).prepare()
+
+
+def test_tests_import_no_more_modules_of_the_rooms_than_the_guide_says():
+    known = modules()
+    inside = {name for name in known if name.count(".") > 1}
+    found = set()
+    for path in TESTS.rglob("*.py"):
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        found |= inside & set(imported(tree, known))
+    told = re.search(r"The tests import (\d+) modules", GUIDE.read_text(encoding="utf-8"))
+    assert len(found) <= int(told[1])

@@ -10,12 +10,14 @@ from tests.noted import refused
 import weighbridge as wb
 from weighbridge.papers.jensen2022_drives import without_weather
 from weighbridge.simulation import make_scenario, random_vehicle, simulate_car, usual_polling
-from weighbridge.vehicle.force_sources import ENGINE_INERTIA
 from weighbridge.vehicle.model import Driveline, TorqueModel
 from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
 
 LATE = 0.08
 """Readings are as late as this [s]."""
+
+TURNING = 0.2
+"""Of the engine of a hybrid [kg m^2]."""
 
 AUX, LOSS, METER = 700.0, 0.05, 360.0
 """Of the battery: beside driving [W], in proportion to power [-], and its voltage [V]."""
@@ -182,7 +184,7 @@ def split(drive):
     engine = np.where(on, np.maximum(asked, 4e3), 0.0)
     turns = uniform_filter1d(np.where(on, 110.0 + 250.0 * (engine / 6e4) ** 0.7, 0.0), 25)
     step = float(np.median(np.diff(truth.time)))
-    spun = ENGINE_INERTIA * np.gradient(turns, step)
+    spun = TURNING * np.gradient(turns, step)
     torque = np.where(on, engine / np.maximum(turns, 60.0) + spun, 0.0)
     motor = power - torque * turns + spun * turns - at_brakes(truth)
     battery = np.where(motor > 0.0, motor / 0.92, motor * 0.92) + AUX

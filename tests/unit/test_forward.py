@@ -97,7 +97,7 @@ def test_what_comes_later_changes_no_bit(weighing, setup, whole, part):
 
 def test_nor_in_a_truck_whose_torque_comes_slowly():
     """Its rows are means of the motion around them."""
-    made = driven("slow", 42_003, TRUCK18, payload=4000.0)
+    made = driven("slow", 42_003, TRUCK18, payload=4000.0, duration=600.0)
     slow = {s.name: replace(s, time=s.time[::3], values=s.values[::3]) for s in polled(made.drive)}
     drive = made.drive.with_signals(*slow.values())
     weighing = wb.weigh(

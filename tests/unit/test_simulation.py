@@ -36,7 +36,6 @@ from weighbridge.simulation import (
     simulate_car,
     usual_polling,
 )
-from weighbridge.simulation.vehicles import POWER_SPLIT, STEPLESS
 
 
 def short(seed=5, duration=80.0, **changes):
@@ -614,6 +613,9 @@ def test_random_vehicles_of_every_kind_drive(kind, vehicle_class):
         boxes = {"manual": "manual", "dct": "dual_clutch", "cvt": "stepless", "hybrid": "stepless"}
         wanted = boxes[kind.removeprefix("petrol_")]
         assert {car.transmission for car in drawn} == {wanted}
+
+
+POWER_SPLIT, STEPLESS = (make_scenario(name).car for name in ("hybrid", "cvt"))
 
 
 def test_a_power_split_moves_as_without_its_motor_and_loses_no_power():
