@@ -60,5 +60,6 @@ def test_an_hour_of_replay_does_not_let_the_page_grow(car, loaded, browser):
     # The window is full after half an hour; notes of what is looked at come and go.
     points, elements, heaps = zip(*sizes, strict=True)
     assert max(points) <= MOST
+    assert points[-1] < 1.2 * points[1]
     assert elements[-1] < elements[0] + 20
     assert heaps[-1] < 1.2 * heaps[1]
