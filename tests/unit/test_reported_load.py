@@ -90,3 +90,27 @@ def test_it_is_read_from_files_and_shown(short_drive, short_car, weighbridge, tm
     assert "reported by the vehicle itself, not used" in page.read_text(encoding="utf-8")
     found = weighbridge("weigh", folder, "--vehicle", car, "--json", "-").out
     assert json.loads(found)["maker_mass_kg"] == 18_340.0
+
+
+def test_a_recording_is_split_at_the_stop_at_which_a_trailer_was_coupled(short_drive, tmp_path):
+    drive = short_drive.drive
+    speed = drive.speed
+    stops = speed.time[speed.values < 0.5]
+    inner = stops[(stops > drive.start + 120.0) & (stops < drive.end - 120.0)]
+    assert inner.size
+    place = (float(inner[-1]) + 4.0 - drive.start) / drive.duration
+
+    def parts(trailer, name):
+        write_drive(told(drive, constant(1900.0), trailer, period=1.0), tmp_path / name, "csv")
+        return wb.read_drives(tmp_path / name)
+
+    # The vehicle notices 4 s after it drove off.
+    first, second = parts(lambda part: (part > place).astype(float), "coupled")
+    assert first.speed.time[-1] <= inner[-1] < second.speed.time[0]
+    assert first.signals["trailer_connected"].values.max() == 0.0
+    assert second.signals["trailer_connected"].values.mean() > 0.9
+    (whole,) = parts(constant(1.0), "towing")
+    # A bad contact of 30 s.
+    shaken = 30.0 / drive.duration
+    (whole,) = parts(lambda part: (np.abs(part - place) > shaken / 2).astype(float), "contact")
+    assert whole.duration == pytest.approx(drive.duration + 50.0, abs=2.0)
