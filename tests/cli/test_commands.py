@@ -21,7 +21,7 @@ COMMANDS = ("demo", "inspect", "calibrate", "weigh", "simulate", "reproduce")
 FIELDS = [
     "drive", "vehicle", "start", "method", "status", "reason", "reason_id", "mass_kg", "std_kg",
     "interval95_kg", "payload_kg", "duration_s", "used_s", "converged_at_s", "bound_std_kg",
-    "segments", "problems", "warnings",
+    "maker_mass_kg", "trailer_connected", "segments", "problems", "warnings",
 ]  # fmt: skip
 
 

@@ -24,7 +24,7 @@ def legs(*rows, tare=9000.0, gross=18000.0):
             | {"drag_area_m2": area, "slip": slip} | (more[0] if more else {})
             for mass, area, slip, *more in rows
         ]
-    )  # fmt: skip
+    ).with_columns(trailer_connected=pl.lit(None, pl.Boolean))  # fmt: skip
 
 
 def probabilities(*rows, **how):
@@ -80,6 +80,29 @@ def test_slip_is_compared_at_the_lateness_that_all_legs_show():
     *_, shifted = probabilities(*rows, (20000.0, 0.8, 0.030 + 0.95 * 2.0 * 0.012, moved))
     *_, slipped = probabilities(*rows, (20000.0, 0.8, 0.030 + 0.95 * 2.0 * 0.012, late))
     assert slipped > 3.0 * shifted
+
+
+def test_the_bit_of_the_vehicle_decides():
+    # By mass, drag area and slip the first had a trailer, and the others had none.
+    shown = [(24000.0, 1.6, 0.060), *OTHERS]
+    bits = [False, True, *[None] * (len(OTHERS) - 1)]
+    said = [
+        drive(str(k), start=f"2026-05-{k + 1:02d}T06:00:00+00:00", mass=float(m), std=0.03 * m,
+              drag_area_m2=a, slip=s, tare_kg=9000.0, trailer_connected=bit,
+              maker_mass_kg=m + 100.0, **SHOWN)
+        for k, ((m, a, s), bit) in enumerate(zip(shown, bits, strict=True))
+    ]  # fmt: skip
+    rows = reported(said).legs.sort("start")
+    assert rows["trailer_probability"].to_list()[:2] == [0.0, 1.0]
+    assert rows["coupled"].to_list() == [bit is True for bit in bits]
+    assert rows["trailer"].to_list() == [bit is True for bit in bits]
+    assert rows["maker_mass_kg"].to_list() == [m + 100.0 for m, _, _ in shown]
+    # Nobody knows what the vehicle may have with its trailer.
+    assert rows["level"].to_list()[:3] == ["alarm", None, "ok"]
+    assert rows["permitted_kg"].to_list()[:3] == [18000.0, None, 18000.0]
+    assert rows["reason_id"].to_list()[:3] == [None, "fleet.trailer_reported", None]
+    untold = [row | {"trailer_connected": None} for row in said]
+    assert reported(untold).legs.sort("start")["trailer_probability"][0] > 0.9
 
 
 def test_an_announced_trailer_is_sure_and_does_not_move_the_vehicle():

@@ -183,6 +183,7 @@ def test_values_that_are_none_are_told_and_left_out(logged, tmp_path):
         (["P", "R", "N", "1st", "2nd", "3rd", "SNA"], [0, -1, 0, 1, 2, 3, None]),
         (["Neutral", "Gang 1", "Gang 2", "Gang 3", "Fehler"], [0, 1, 2, 3, None]),
         (["released", "pressed", "not available"], [0, 1, None]),
+        (["released", "pressed", "NoDataExists"], [0, 1, None]),
     ],
 )
 def test_numbers_behind_texts_of_an_mdf_are_read(tmp_path, texts, numbers):

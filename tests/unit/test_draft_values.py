@@ -124,6 +124,44 @@ def test_what_slows_the_vehicle_down_is_the_brake_s_switch(tmp_path):
     assert "brake_switch" not in drafted(tmp_path, pressure)[0]
 
 
+LOAD = 1600.0 + 200.0 * (T > 120.0) + 600.0 * (T > 300.0)
+"""What a car makes of its mass, in steps; 120 kg more than it weighs at the end."""
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "taken"),
+    [
+        ("TSK_Fahrzeugmasse_02 [kg]", LOAD, True),
+        ("Gross Combination Vehicle Weight (t)", 0.001 * LOAD, True),
+        # Before it knows one, it sends none.
+        ("vehicle mass [kg]", np.where(T < 60.0, 0.0, LOAD), True),
+        ("vehicle mass [kg]", np.full(T.size, 1500.0), False),
+        ("vehicle mass [kg]", 1500.0 * (1.0 + 0.1 * SPEED), False),
+        ("vehicle mass [kg]", 0.01 * LOAD, False),
+        ("max. vehicle mass [kg]", LOAD, False),
+        ("trailer weight [kg]", LOAD, False),
+    ],
+)
+def test_a_mass_that_a_vehicle_reports_stays_as_a_load_does(tmp_path, name, values, taken):
+    found, _ = drafted(tmp_path, {"Speed (km/h)": 3.6 * SPEED, name: values})
+    assert found.get("maker_mass") == (name if taken else None)
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "taken"),
+    [
+        ("AAG_Anhaenger_erkannt", T > 200.0, True),
+        ("CGM_TrailerPresent", T > 200.0, True),
+        ("Trailer connected", 13.8 * (T > 200.0), False),
+        ("AAG_Anhaenger_abgesteckt", T > 200.0, False),
+        ("Trailer mode", T > 200.0, False),
+    ],
+)
+def test_a_bit_says_that_a_trailer_is_connected(tmp_path, name, values, taken):
+    found, _ = drafted(tmp_path, {"Speed (km/h)": 3.6 * SPEED, name: values.astype(float)})
+    assert found.get("trailer_connected") == (name if taken else None)
+
+
 def test_the_rated_power_is_no_power(tmp_path):
     columns = {"Speed (km/h)": 3.6 * SPEED, "ENGINE_POWER": np.full(T.size, 85.0)}
     assert "engine_power" not in drafted(tmp_path, columns)[0]

@@ -227,15 +227,30 @@ def test_odometer_that_disagrees_with_the_speed_is_told():
     assert decode_j1939(frames(*both)).summary.problems == []
 
 
-def test_weights_the_vehicle_reports_are_told_and_not_taken():
+def test_the_mass_of_the_combination_is_the_maker_s_mass():
     rows = [
-        (0.0, 0x18FE7003, "FF FF D0 07 FF FF FF FF"),  # 2000 * 10 kg
+        (0.0, 0x18FE7003, "84 03 00 00 FF FF FF FF"),  # 900 * 10 kg alone; no combination yet
+        (1.0, 0x18FE7003, "84 03 D0 07 FF FF FF FF"),  # 2000 * 10 kg together
+        (2.0, 0x18FE7003, "84 03 D1 07 FF FF FF FF"),
+        (3.0, 0x18FE7003, "84 03 FF FF FF FF FF FF"),
+    ]
+    assert_array_equal(signals(*rows)["maker_mass"].values, [20000.0, 20010.0])
+    # Of a vehicle that reports itself alone.
+    alone = decode_j1939(frames(rows[0], rows[3]))
+    (found,) = alone.signals
+    assert (found.name, found.values.tolist()) == ("maker_mass", [9000.0, 9000.0])
+    assert alone.summary.sources == {"maker_mass": 3}
+    assert decode_j1939(frames((0.0, 0x18FE7003, "FF FF 00 00 FF FF FF FF"))).signals == []
+
+
+def test_axle_weights_the_vehicle_reports_are_told_and_not_taken():
+    rows = [
         (0.1, 0x18FEEA31, "00 20 4E FF FF FF FF FF"),  # 20000 * 0.5 kg
         (0.2, 0x18FEEA31, "10 10 27 FF FF FF FF FF"),  # 10000 * 0.5 kg
     ]
     found = decode_j1939(frames(*rows))
     told = {p.id: p.values["mass"] for p in found.summary.problems}
-    assert told == {"mass.reported": 20000.0, "mass.axles_reported": 15000.0}
+    assert told == {"mass.axles_reported": 15000.0}
     assert found.signals == []
 
 

@@ -28,7 +28,7 @@ TRACK_COLUMNS = [
 FIELDS = {
     "drive", "vehicle", "start", "method", "status", "reason", "reason_id", "mass_kg", "std_kg",
     "interval95_kg", "payload_kg", "duration_s", "used_s", "converged_at_s", "bound_std_kg",
-    "segments", "problems", "warnings",
+    "maker_mass_kg", "trailer_connected", "segments", "problems", "warnings",
 }  # fmt: skip
 
 
@@ -93,6 +93,9 @@ def test_numbers_are_null_where_there_is_no_mass(status):
 
 
 def test_a_row_is_light_whatever_the_drive_holds(good):
+    # A NaN is not equal to itself.
+    reported = Signal("maker_mass", STAMPS, np.full(STAMPS.size, 1500.0))
+    good = replace(good, drive=good.drive.with_signals(reported))
     row = pickle.dumps(good.row)
     assert len(row) < 5000 < len(pickle.dumps(good)) / 10
     assert pickle.loads(row) == good.row

@@ -40,6 +40,7 @@ from weighbridge.checks.vehicle import check_vehicle
 from weighbridge.navigation.along import with_forward_accel
 from weighbridge.navigation.clock_drift import correct_clocks
 from weighbridge.signals import Drive, Problem
+from weighbridge.signals.catalogue import REPORTED
 from weighbridge.signals.held import without_repeats
 from weighbridge.signals.timeline import one_recording, well_formed
 from weighbridge.vehicle.model import Vehicle
@@ -82,10 +83,21 @@ def correct_drive(drive: Drive, vehicle: Vehicle | None = None) -> Drive:
     Returns
     -------
     Drive
-        On clocks that rise, within physical ranges, without samples that are false. What was found
+        On clocks that rise, within physical ranges, without samples that are false. What the
+        vehicle reports of its own load (`REPORTED`) changes none of it. What was found
         is added to its ``problems``, serious ones first. What is wrong with a signal that a person
         vouches for (``drive.info.trusted``) is never serious.
     """
+    found = _corrected(drive.without(*REPORTED), vehicle)
+    beside = drive.without(*(name for name in drive.signals if name not in REPORTED))
+    if not beside.signals:
+        return found
+    told = within_ranges(well_formed(beside)).between(found.start, found.end)
+    return found.with_signals(*told.signals.values())
+
+
+def _corrected(drive: Drive, vehicle: Vehicle | None) -> Drive:
+    """Correct a drive without what the vehicle reports of its own load."""
     earlier = drive.problems
     drive = well_formed(drive)
     if found := tuple(check_rates(drive, vehicle)):

@@ -285,6 +285,8 @@ def _show_one(row: WeighingRow, car: Vehicle, screen: Console) -> None:
         say(f"from {minutes:.1f} min of {row.duration / 60.0:.1f} min, method {row.method}")
     else:
         say(f"{row.drive}: no mass ({row.status}): {_reason(row)}")
+    if row.maker_mass == row.maker_mass:
+        say(f"the vehicle itself reports {kg(row.maker_mass)}, which is not used")
     say_notes([p.shown for p in row.problems], screen)
 
 

@@ -60,9 +60,13 @@ def _coupling(cells: tuple[Any, ...], where: str) -> Coupling:
 def with_couplings(legs: pl.DataFrame, couplings: Sequence[Coupling]) -> pl.DataFrame:
     """Add the permitted mass of each leg, and whether a trailer was coupled at its middle.
 
+    A trailer that the vehicle reports is coupled, too. Without a row of the table nobody knows what
+    both may have.
+
     Parameters
     ----------
-    legs : with the columns ``vehicle_id``, ``start``, ``end`` [UTC] and ``gross_kg``
+    legs : with the columns ``vehicle_id``, ``start``, ``end`` [UTC], ``gross_kg`` and
+        ``trailer_connected``
     couplings : of a vehicle, the one that began last counts
 
     Returns
@@ -79,6 +83,7 @@ def with_couplings(legs: pl.DataFrame, couplings: Sequence[Coupling]) -> pl.Data
         },
         orient="row",
     ).sort("_start")
+    told = pl.col("trailer_connected").fill_null(value=False)
     middle = pl.col("start") + (pl.col("end") - pl.col("start")) / 2
     rows = legs.with_row_index("_row").with_columns(_middle=middle)
     found = (
@@ -94,8 +99,10 @@ def with_couplings(legs: pl.DataFrame, couplings: Sequence[Coupling]) -> pl.Data
     return (
         rows.join(found, on="_row", how="left", maintain_order="left")
         .with_columns(
-            permitted_kg=pl.coalesce("_permitted", "gross_kg"),
-            coupled=pl.col("_permitted").is_not_null(),
+            permitted_kg=pl.when(told & pl.col("_permitted").is_null())
+            .then(None)
+            .otherwise(pl.coalesce("_permitted", "gross_kg")),
+            coupled=pl.col("_permitted").is_not_null() | told,
         )
         .drop("_row", "_middle", "_permitted")
     )

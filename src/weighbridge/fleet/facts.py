@@ -31,6 +31,7 @@ _NUMBERS: Final = {
     "used_s": "used_time",
     "converged_at_s": "converged_at",
     "bound_std_kg": "bound_std",
+    "maker_mass_kg": "maker_mass",
 }
 """Columns that hold a number of `WeighingRow`, and its field there."""
 
@@ -50,6 +51,7 @@ def answer(row: WeighingRow) -> dict[str, Any]:
         "high95_kg": _number(row.interval[1]),
         "warnings": list(row.warnings),
         "problem_ids": [p.id for p in row.problems],
+        "trailer_connected": row.trailer_connected,
         **{column: _number(getattr(row, field)) for column, field in _NUMBERS.items()},
         "segments": [
             {
@@ -69,6 +71,7 @@ def weighing_row(drive: Mapping[str, Any], segments: Sequence[Mapping[str, Any]]
 
     Spans without a segment of `weigh` are left out. Signals and spans of problems are not kept.
     """
+    numbers: dict[str, Any] = {field: _float(drive[name]) for name, field in _NUMBERS.items()}
     ids = drive["problem_ids"] or [None] * len(drive["warnings"])
     return WeighingRow(
         drive=drive["drive"],
@@ -90,7 +93,8 @@ def weighing_row(drive: Mapping[str, Any], segments: Sequence[Mapping[str, Any]]
             if s["start_s"] is not None
         ),
         load_changed=bool(drive["load_changed"]),
-        **{field: _float(drive[column]) for column, field in _NUMBERS.items()},
+        trailer_connected=drive["trailer_connected"],
+        **numbers,
     )
 
 

@@ -27,7 +27,7 @@ _POSITION: Final = tuple(
 _OF_DRIVE: Final = (
     "key", "part", "date", "source", "drive", "outcome", "vehicle_id", "vehicle_file",
     "vehicle_class", "tare_kg", "gross_kg", "status", "reason_id", "reason", "freedom", "type",
-    "factor", "vehicle_digest", *SHOWN,
+    "factor", "vehicle_digest", "maker_mass_kg", "trailer_connected", *SHOWN,
 )  # fmt: skip
 _MASS: Final = ("mass_kg", "std_kg", "weighed_kg", "weighed_std_kg")
 _OF_LEG: Final = (*_MASS, "distance_km", "moving_s", *_POSITION)

@@ -11,13 +11,14 @@ from typing import Final, NamedTuple
 
 import polars as pl
 
-FORMAT_VERSION: Final = 6
+FORMAT_VERSION: Final = 7
 """Version of the tables; part of every key, so that another one weighs anew."""
 
-READABLE: Final = (2, 3, 4, 5, FORMAT_VERSION)
-"""Versions that can be read. Before 6, rows lack drag area and wheel slip. Before 5, they lack the
-digest of the vehicle file. Before 4, a recording was known by its content alone and ``start`` was a
-text; tables of 2 lack ids of messages."""
+READABLE: Final = (2, 3, 4, 5, 6, FORMAT_VERSION)
+"""Versions that can be read. Before 7, rows lack what the vehicle reports of its load. Before 6,
+they lack drag area and wheel slip. Before 5, they lack the digest of the vehicle file. Before 4, a
+recording was known by its content alone and ``start`` was a text; tables of 2 lack ids of messages.
+"""
 
 DAY: Final = "day"
 """Name of the partitions: no column of the tables has it, so that no reader finds two types."""
@@ -81,6 +82,10 @@ DRIVES: Final[dict[str, Column]] = {
     "used_s": Column(_NUMBER, "time of the rows that the mass is made of"),
     "converged_at_s": Column(_NUMBER, "from the start until the mass stays at the result"),
     "bound_std_kg": Column(_NUMBER, "Cramér-Rao bound of the drive"),
+    "maker_mass_kg": Column(_NUMBER, "mass that the vehicle itself reports; not used"),
+    "trailer_connected": Column(
+        pl.Boolean(), "the vehicle reports a trailer; null if it does not say"
+    ),
     "warnings": Column(
         pl.List(pl.String()), "what was corrected or is uncertain, one sentence each"
     ),
@@ -159,6 +164,7 @@ LEGS: Final[dict[str, Column]] = {
     "common_kg": Column(_NUMBER, "part of shared_kg that vehicles of its type or class share"),
     "weighed_kg": Column(_NUMBER, "mass as of the drive, before the factor"),
     "weighed_std_kg": Column(_NUMBER, "its standard deviation"),
+    "maker_mass_kg": Column(_NUMBER, "mass that the vehicle itself reports, as of the drive"),
     "type": Column(_TEXT, "vehicles of it share common_kg; null if no factor is learnt"),
     "factor": Column(_NUMBER, "mass_kg over weighed_kg, learnt from the fleet; null if none is"),
     "freedom": DRIVES["freedom"],
@@ -169,9 +175,9 @@ LEGS: Final[dict[str, Column]] = {
     "payload_low95_kg": Column(_NUMBER, "lower end of its 95 % interval; the tare is exact"),
     "payload_high95_kg": Column(_NUMBER, "upper end of it"),
     "gross_kg": DRIVES["gross_kg"],
-    "permitted_kg": Column(_NUMBER, "permitted mass, with a trailer that is known to be coupled"),
-    "coupled": Column(pl.Boolean(), "a table of couplings names a trailer"),
-    "trailer_probability": Column(_NUMBER, "of a trailer; 1 if coupled, null if it is not known"),
+    "permitted_kg": Column(_NUMBER, "permitted mass, of both where a table names a trailer"),
+    "coupled": Column(pl.Boolean(), "a table of couplings or the vehicle itself names a trailer"),
+    "trailer_probability": Column(_NUMBER, "of a trailer; 1 if coupled, null if not known"),
     "trailer": Column(pl.Boolean(), "coupled, or the probability of a trailer is high"),
     "overload": Column(_NUMBER, "probability that the mass is above the permitted one"),
     "level": Column(_TEXT, "ok, warn (likely) or alarm (sure); null where overload is"),

@@ -67,12 +67,14 @@ def with_trailers(legs: pl.DataFrame) -> pl.DataFrame:
     Parameters
     ----------
     legs : with the columns ``vehicle_id``, ``vehicle_digest``, ``vehicle_class``, ``mass_kg``,
-        ``std_kg``, ``tare_kg``, ``gross_kg``, ``coupled`` and those of `SHOWN`
+        ``std_kg``, ``tare_kg``, ``gross_kg``, ``coupled``, ``trailer_connected`` and those of
+        `SHOWN`
 
     Returns
     -------
     The legs, in their order, with ``trailer_probability``: null where mass, empty mass or
-    permitted mass is not known, and 1 where a trailer is known to be coupled
+    permitted mass is not known, 1 where a trailer is known to be coupled, and 0 where the vehicle
+    reports that it has none
     """
     rows = legs.with_row_index("_row")
     found = np.full(legs.height, np.nan)
@@ -90,7 +92,8 @@ def _probabilities(legs: pl.DataFrame) -> Floats:
     gross = column("gross_kg")
     mass, std, tare = (column(name) / gross for name in ("mass_kg", "std_kg", "tare_kg"))
     odds = SHARE / (1.0 - SHARE) * _mass_odds(mass, std, tare)
-    towed = np.where(legs["coupled"].to_numpy(), 1.0, odds / (1.0 + odds))
+    none = (~legs["trailer_connected"]).fill_null(value=False).to_numpy()
+    towed = np.select([legs["coupled"].to_numpy(), none], [1.0, 0.0], odds / (1.0 + odds))
     drawn = np.isin(legs["vehicle_class"].to_numpy(), DRAWN_BY)
     if not (np.isfinite(towed) & drawn).any():
         return np.asarray(towed)

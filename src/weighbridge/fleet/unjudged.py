@@ -17,7 +17,8 @@ def with_causes(rows: pl.DataFrame, permitted: str) -> pl.DataFrame:
 
     Parameters
     ----------
-    rows : with ``mass_kg``, ``tare_kg``, ``vehicle_file``, ``reason`` and ``reason_id``
+    rows : with ``mass_kg``, ``tare_kg``, ``gross_kg``, ``vehicle_file``, ``reason`` and
+        ``reason_id``
     permitted : column of the permitted mass
 
     Returns
@@ -31,6 +32,11 @@ def with_causes(rows: pl.DataFrame, permitted: str) -> pl.DataFrame:
             "overload",
             pl.col(permitted).is_null() & pl.col("vehicle_file").is_null(),
             Problem.of("fleet.no_file"),
+        ),
+        (
+            "overload",
+            pl.col(permitted).is_null() & pl.col("gross_kg").is_not_null(),
+            Problem.of("fleet.trailer_reported"),
         ),
         ("overload", pl.col(permitted).is_null(), Problem.of("fleet.no_permitted")),
         ("payload", pl.col("tare_kg").is_null(), Problem.of("fleet.no_tare")),

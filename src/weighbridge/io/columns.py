@@ -39,6 +39,7 @@ UNIT_TEXTS: Final[dict[str, str]] = {
     "unit_minutinver": "rpm", "unit_kilometerperhour": "kmh", "unit_percent": "pct",
     "unit_newtometer": "nm", "unit_degrecelsi": "degc", "unit_volt": "v", "unit_amper": "a",
     "unit_meterperseconsquar": "mps2", "unit_degreofarc": "deg", "unit_secon": "s",
+    "unit_kilogram": "kg", "kilogram": "kg", "kilograms": "kg",
     "sec": "s", "seconds": "s", "µs": "us", "μs": "us",
     **dict.fromkeys(("km/std", "km/u", "km/uur", "km/t", "km/tim", "km/sa", "km/saat", "km/hod",
                      "km/godz", "km/ora"), "kmh"),

@@ -41,10 +41,17 @@ ACCEL: Final = ("accel_x", "accel_y", "accel_z")
 _NEAR_GRAVITY: Final = 0.15
 """Part by which the size of an acceleration may differ from gravity in the median [-]."""
 
-_SWITCHES: Final = frozenset(("brake_switch", "clutch_switch"))
+_SWITCHES: Final = frozenset(("brake_switch", "clutch_switch", "trailer_connected"))
 
 _STATES: Final = 4
 """Values of a switch, at most: J1939 has off, on, error and not available."""
+
+_MASS_WINDOW: Final = 60.0
+"""Time in which a vehicle's own estimate of its mass mostly stays: loads change at stops [s]."""
+
+_MASS_STAYS: Final = 1.1
+"""Highest over lowest value of such an estimate in that time, at most in half of the times [-]:
+steps of 200 kg, as some cars have, are 12 % of 1700 kg and are rare."""
 
 _DROPPED: Final = 0.02
 """Part of a battery's voltages that may be lower: contactors open [-]."""
@@ -114,6 +121,7 @@ def with_judged_values(
     """
     columns = tuple(_without_gauge(c, reported) for c in _on_board(columns))
     columns = _without_constants(_without_levels(columns, reported))
+    columns = tuple(_without_set_mass(c, columns, reported) for c in columns)
     columns = _with_gravity(columns, reported)
     for quantity, fits in (
         *zip(FOUND, (_moves, _turns, _breathes), strict=True),
@@ -227,6 +235,33 @@ def _without_constants(columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, .
         else c
         for c in columns
     )
+
+
+def _without_set_mass(
+    column: DraftColumn, columns: tuple[DraftColumn, ...], reported: Mapping[str, Values]
+) -> DraftColumn:
+    """Take no set-point, and nothing that changes as the drive goes, for the maker's mass."""
+    if column.quantity != "maker_mass" or column.name not in reported:
+        return column
+    values = reported[column.name]
+    time, mass = values.time, to_si(values.values, column.unit)
+    quantity = QUANTITIES["maker_mass"]
+    there = np.isfinite(time) & (mass >= quantity.low) & (mass <= quantity.high)
+    speed = next((c for c in columns if c.quantity in ("vehicle_speed", "gnss_speed")), None)
+    if speed is not None:
+        with np.errstate(invalid="ignore"):
+            there &= _at(replace(reported[speed.name], unit=speed.unit), time) > _SLOW
+    time, mass = time[there], mass[there]
+    if time.size < _FEWEST:
+        return _nothing(column, "shows no mass of a vehicle while it moves")
+    if np.ptp(mass) == 0.0:
+        return _nothing(column, "never changes, as a mass that was set")
+    window = np.floor(time / _MASS_WINDOW)
+    starts = np.flatnonzero(np.diff(window, prepend=-np.inf))
+    spread = np.maximum.reduceat(mass, starts) / np.minimum.reduceat(mass, starts)
+    if float(np.median(spread)) > _MASS_STAYS:
+        return _nothing(column, "changes while the vehicle drives, as no load does")
+    return column
 
 
 def _nothing(column: DraftColumn, why: str) -> DraftColumn:

@@ -89,7 +89,8 @@ SPNS: Final[tuple[Spn, ...]] = (
     Spn(183, "fuel_rate", LFE, 1, 1, 16, 0.05, 0.0, "lph"),
     Spn(928, "axle", VW, 1, 1, 8),
     Spn(582, "axle_weight", VW, 2, 1, 16, 0.5, 0.0, "kg"),
-    Spn(1760, "combination_weight", CVW, 3, 1, 16, 10.0, 0.0, "kg"),
+    Spn(1585, "powered_weight", CVW, 1, 1, 16, 10.0, 0.0, "kg"),
+    Spn(1760, "maker_mass", CVW, 3, 1, 16, 10.0, 0.0, "kg"),
     Spn(544, "reference_torque", EC1, 20, 1, 16, 1.0, 0.0, "nm"),
 )
 """Every parameter read, all of SAE J1939-71."""
@@ -108,6 +109,9 @@ SWITCHES: Final = {
     "clutch_switch": ("clutch", "driveline_engaged", "shift_in_process"),
 }
 """Switches, and the parameters of which any says that one is pressed."""
+
+_ABOVE_ZERO: Final = frozenset(("reference_torque", "powered_weight", "maker_mass"))
+"""Parameters whose zero is no value: a controller sends it until it knows one."""
 
 _PARK: Final = 0xFB
 """SPN 523: a gearbox in park is shown by a code above the range of gears."""
@@ -211,6 +215,7 @@ def decode_j1939(frames: Frames, name: str = "J1939") -> J1939:
     signals += [
         *_net_torque(reader),
         *(reader.pressed(name, spns) for name, spns in SWITCHES.items()),
+        _reported_mass(reader),
     ]
     for extra in ("input_shaft_speed", "output_shaft_speed", "clutch_slip", "gear_ratio"):
         if (found := reader.best(extra)) is not None:
@@ -218,7 +223,7 @@ def decode_j1939(frames: Frames, name: str = "J1939") -> J1939:
     found_signals = [s for s in signals if s is not None]
     _check_buses(reader)
     _check_distance(reader, found_signals)
-    _tell_weights(reader)
+    _tell_axle_weights(reader)
     if summary.incomplete:
         reader.note(
             Problem.of(
@@ -329,7 +334,7 @@ def spn_values(part: Frames, spn: Spn) -> Floats:
     raw = (raw >> np.uint64(spn.bit - 1)) & np.uint64((1 << spn.bits) - 1)
     top = 1 if spn.bits == 2 else (0xFB << (spn.bits - 8)) - 1
     good = (raw <= top) & (part.length >= first + width)
-    if spn.name == "reference_torque":
+    if spn.name in _ABOVE_ZERO:
         good &= raw > 0
     values = raw.astype(np.float64) * spn.resolution + spn.offset
     if spn.name == "gear":
@@ -429,13 +434,21 @@ def _check_distance(reader: _Reader, signals: list[Signal]) -> None:
     reader.note(Problem.of("speed.odometer", "vehicle_speed", driven=driven, way=way))
 
 
-def _tell_weights(reader: _Reader) -> None:
-    """Return the weights the vehicle itself reports: a hint, never a known mass."""
-    gross = reader.best("combination_weight")
-    reader.summary.sources.pop("combination_weight", None)
-    if gross is not None:
-        reader.summary.extras["combination_weight"] = gross
-        reader.note(Problem.of("mass.reported", mass=float(np.median(gross.values))))
+def _reported_mass(reader: _Reader) -> Signal | None:
+    """Return the mass of the combination, as the vehicle reports it; else of the vehicle alone."""
+    found = reader.best("maker_mass")
+    if found is not None:
+        return found
+    alone = reader.best("powered_weight")
+    source = reader.summary.sources.pop("powered_weight", None)
+    if alone is None or source is None:
+        return None
+    reader.summary.sources["maker_mass"] = source
+    return Signal("maker_mass", alone.time, alone.values)
+
+
+def _tell_axle_weights(reader: _Reader) -> None:
+    """Note the sum of the axle weights that the vehicle itself reports: a hint, never a mass."""
     part = reader.parts.get(VW)
     if part is None or not len(part):
         return

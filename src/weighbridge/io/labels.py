@@ -13,7 +13,8 @@ from weighbridge.signals import Floats
 _NO_VALUE: Final = re.compile(
     r"\b(sna|n/?a|nan|not?[ -]?(avail\w*|valid|defined|plausible|ready|initiali[sz]ed)"
     r"|un(avail\w*|defined|def|known|plausible|initiali[sz]ed)|signal[ ]?not[ ]?avail\w*"
-    r"|no[ ]?(signal|data|value)|inv(alid)?|init(iali[sz]\w*)?|reserved|missing|fault\w*|fail\w*"
+    r"|no[ ]?(signal|data|value)([ ]?exists?)?|inv(alid)?"
+    r"|init(iali[sz]\w*)?|reserved|missing|fault\w*|fail\w*"
     r"|err(or)?|defect\w*|timeout|ungueltig|ungültig|undefiniert|fehler|nicht[ ]?(verf\w*|defin\w*"
     r"|initialisiert))\b",
     re.IGNORECASE,

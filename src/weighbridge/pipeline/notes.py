@@ -10,6 +10,7 @@ from weighbridge.balance.speed_balance import SPEEDS
 from weighbridge.estimators import ESTIMATORS, MassTrack, Status
 from weighbridge.estimators.judging import grade_apart, lacks_accelerometer, sampled_otherwise
 from weighbridge.messages import Problem, phrase
+from weighbridge.results.reported import trailer_connected
 from weighbridge.signals import Drive
 from weighbridge.vehicle.data_sheet import needs_calibration, wheel_efficiency
 from weighbridge.vehicle.model import Vehicle
@@ -29,6 +30,13 @@ def uncalibrated(vehicle: Vehicle, result: MassTrack) -> tuple[Problem, ...]:
     share = 100.0 * result.systematic_std / result.mass
     efficiency = wheel_efficiency(vehicle)
     return (Problem.of("vehicle.uncalibrated_std", **about, efficiency=efficiency, share=share),)
+
+
+def towing(drive: Drive, result: MassTrack | None) -> tuple[Problem, ...]:
+    """Say that the vehicle reports a trailer, for its mass is in the one weighed; else nothing."""
+    if trailer_connected(drive, result):
+        return (Problem.of("mass.with_trailer", "trailer_connected"),)
+    return ()
 
 
 UNBACKED_STD: Final = 0.025

@@ -225,6 +225,8 @@ def _facts(weighing: MassResult) -> str:
         ("duration", duration(weighing.drive.duration)),
         ("used", duration(weighing.used_time)),
     ]
+    if math.isfinite(weighing.maker_mass):
+        facts.append(("reported by the vehicle itself, not used", kg(weighing.maker_mass)))
     if result is not None and _found(weighing):
         after = result.converged_at - weighing.drive.start
         facts.append(("settled within ± 5 % after", duration(after)))

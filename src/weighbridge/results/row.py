@@ -28,6 +28,8 @@ class WeighingRow(Explained):
     payload : mass minus the vehicle's tare [kg]; NaN where either is unknown
     duration, used_time, converged_at : of the drive, of the rows used, until the mass stays [s]
     bound_std : Cramer-Rao bound of the drive [kg]
+    maker_mass : that the vehicle itself reports, shown and never used [kg]; NaN without one
+    trailer_connected : whether the vehicle reports a trailer; None where it does not say
     load_changed : whether the load changed between segments; else they are legs of a drive
     """
 
@@ -45,6 +47,8 @@ class WeighingRow(Explained):
     used_time: float = math.nan
     converged_at: float = math.nan
     bound_std: float = math.nan
+    maker_mass: float = math.nan
+    trailer_connected: bool | None = None
     segments: tuple[Segment, ...] = ()
     problems: tuple[Problem, ...] = ()
     load_changed: bool = False
@@ -67,6 +71,8 @@ class WeighingRow(Explained):
             "used_s": number(self.used_time),
             "converged_at_s": number(self.converged_at),
             "bound_std_kg": number(self.bound_std),
+            "maker_mass_kg": number(self.maker_mass),
+            "trailer_connected": self.trailer_connected,
             "segments": [
                 {
                     "start_s": number(s.start),

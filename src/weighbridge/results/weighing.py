@@ -13,6 +13,7 @@ from scipy.special import stdtrit
 from weighbridge.balance import REASON_TEXT, Reason
 from weighbridge.estimators import ESTIMATORS, Estimator, MassTrack, Segment, Status
 from weighbridge.messages import Explained
+from weighbridge.results.reported import maker_mass, trailer_connected
 from weighbridge.results.row import WeighingRow
 from weighbridge.results.writing import check_level, write_track
 from weighbridge.signals import Drive, Problem
@@ -104,6 +105,19 @@ class MassResult(Explained):
         """Mass minus the vehicle's tare [kg]; NaN where either is unknown."""
         return self.mass - self.vehicle.tare if self.vehicle.tare is not None else math.nan
 
+    @property
+    def maker_mass(self) -> float:
+        """Mass that the vehicle itself reports, median of the rows weighed [kg]; NaN without one.
+
+        It is shown beside `mass`, which does not use it.
+        """
+        return maker_mass(self.drive, self.result)
+
+    @property
+    def trailer_connected(self) -> bool | None:
+        """Whether the vehicle reports a trailer for most of the rows weighed; None if unknown."""
+        return trailer_connected(self.drive, self.result)
+
     def interval(self, level: float = 0.95) -> tuple[float, float]:
         """Interval that holds the mass with the probability ``level`` [kg].
 
@@ -193,6 +207,8 @@ class MassResult(Explained):
             used_time=self.used_time,
             converged_at=self.converged_at,
             bound_std=self.result.bound_std if self.result else math.nan,
+            maker_mass=self.maker_mass,
+            trailer_connected=self.trailer_connected,
             segments=self.segments,
             problems=self.problems,
             load_changed=self.load_changed,

@@ -127,6 +127,10 @@ _ROWS: Final = (
     Quantity("clutch_switch", "obd", "clutch_switch", "", 0.0, 1.0, "1 while the clutch is pressed"),
     Quantity("retarder_torque", "obd", "retarder_torque", "pct", -1.3, 1.3,
              "torque of a retarder as a part of its reference torque, negative while it brakes (SPN 520)"),
+    Quantity("maker_mass", "obd", "maker_mass", "kg", 100.0, 200e3,
+             "mass that the vehicle itself reports, with its trailer where it knows of one (SPN 1760)"),
+    Quantity("trailer_connected", "obd", "trailer_connected", "", 0.0, 1.0,
+             "1 while a trailer is connected"),
     Quantity("latitude", "gnss", "latitude", "deg", -math.pi / 2, math.pi / 2, "WGS 84 latitude"),
     Quantity("longitude", "gnss", "longitude", "deg", -math.pi, math.pi, "WGS 84 longitude"),
     Quantity("altitude", "gnss", "altitude", "m", -500.0, 6000.0, "height"),
@@ -158,6 +162,9 @@ TABLES: Final = ("imu", "obd", "gnss", "ride")
 
 IMU_SIGNALS: Final = tuple(q.name for q in _ROWS if q.table == "imu")
 """Specific force and angular rate along the three axes of an inertial sensor."""
+
+REPORTED: Final = ("maker_mass", "trailer_connected")
+"""What a vehicle says of its own load. Results show it; no mass is made of it."""
 
 TIME_COLUMN: Final = "time_s"
 """The time column of every canonical table: seconds on one common clock."""

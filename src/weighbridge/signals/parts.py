@@ -1,4 +1,4 @@
-"""Several drives in one recording: parted where it pauses, stands long, or was spliced."""
+"""Several drives in one recording: parted at pauses, long stops, trailers and splices."""
 
 from __future__ import annotations
 
@@ -28,6 +28,9 @@ KEPT: Final = 60.0
 
 DRIVEN: Final = 30.0
 """A part in which the vehicle moves for less is no drive [s]."""
+
+COUPLED: Final = 60.0
+"""A trailer that is reported, or no more, for less is a bad contact [s]; chosen."""
 
 _STILL: Final = 0.5  # slower, the vehicle stands [m/s]
 _MOVING: Final = 3.0  # faster, it moves [m/s]
@@ -69,6 +72,7 @@ def find_cuts(drive: Drive) -> list[Cut]:
     if speed is None or len(speed) < 2 * _AROUND:
         return []
     found = [*_pauses(drive, speed), *_stops(speed), *find_splices(drive)]
+    found += _couplings(drive, speed)
     cuts: list[Cut] = []
     for cut in sorted(found):
         if not cuts or cut.end >= cuts[-1].begin:
@@ -343,6 +347,30 @@ def _stops(speed: Signal) -> list[Cut]:
         for a, b in zip(first, last, strict=True)
         if b - a >= STANDING
     ]
+
+
+def _couplings(drive: Drive, speed: Signal) -> list[Cut]:
+    """Find the stops at which the vehicle begins to report a trailer, or no longer does.
+
+    It may notice only after it moves on: the last stop before counts.
+    """
+    bit = drive.get("trailer_connected")
+    if bit is None or not len(bit):
+        return []
+    on = bit.values > 0.5
+    first = np.flatnonzero(np.concatenate(([True], on[1:] != on[:-1])))
+    begins, states = bit.time[first], on[first]
+    stays = np.diff(np.append(begins, bit.time[-1])) >= COUPLED
+    begins, states = begins[stays], states[stays]
+    still = np.flatnonzero(np.abs(speed.values[:-1]) < _STILL)
+    found = []
+    for begin in begins[1:][states[1:] != states[:-1]]:
+        before = still[speed.time[still] <= begin]
+        if before.size:
+            found.append(int(before[-1]))
+    return _reported(
+        speed.time, np.array(found, dtype=np.intp), "a trailer that was coupled or uncoupled"
+    )
 
 
 def _between(drive: Drive, start: float, end: float) -> Drive:
