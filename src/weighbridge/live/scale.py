@@ -386,15 +386,16 @@ class LiveScale:
     def _unfollowed_stop(self, state: ForwardState | None) -> UnfollowedStop:
         """Return the longest stop since what the mass is made of, and what it leaves open.
 
-        A stop that is no longer than the vehicle has stood by now is this one: the mass is that
-        with which it came.
+        A stop that is no longer than the vehicle has stood by now, but for the look ahead, is this
+        one: the mass is that with which it came.
         """
+        now = self._move.stood
         if self._setup is not None and state is not None and state.joint.windows:
-            stood, by_speed = forward.unfollowed_stop(state), False
+            stood, by_speed = forward.unfollowed_stop(state, moved=now == 0.0), False
             settings = self._setup.joint.settings
         else:
             stood, by_speed, settings = self._move.rested, True, JointSettings()
-        if stood <= self._move.stood:
+        if now > 0.0 and stood <= now + self._every + self._records.lateness:
             return NO_STOP
         std = unfollowed_std(stood, settings.change_std, by_speed=by_speed)
         return UnfollowedStop(stood, std)

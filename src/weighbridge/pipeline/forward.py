@@ -259,10 +259,14 @@ def too_wide(state: ForwardState | None, setup: ForwardSetup | None) -> float:
     return std if std > sizes.settings.widest else 0.0
 
 
-def unfollowed_stop(state: ForwardState) -> float:
-    """Longest stop, the one that goes on counted, after which no window is in the mass yet [s]."""
+def unfollowed_stop(state: ForwardState, *, moved: bool) -> float:
+    """Longest stop after which no window is in the mass yet [s].
+
+    With ``moved`` the vehicle drives on by now, and a stop that the state is still in counts.
+    """
     windows = state.windows
-    return float(max(windows.rest, windows.longest, windows.stood if windows.rows else 0.0))
+    stood = max(windows.longest, windows.stood if windows.rows else 0.0)
+    return float(max(stood, windows.rest) if moved else stood)
 
 
 def lateness(setup: ForwardSetup) -> float:

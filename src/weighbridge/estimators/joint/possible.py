@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from weighbridge.estimators.joint.problem import FilterInput, load_params
 from weighbridge.estimators.joint.settings import JointSettings
-from weighbridge.kernels import disturbance
+from weighbridge.kernels import disturbance, load_change
 from weighbridge.messages import Problem, phrase
 from weighbridge.signals import Floats
 from weighbridge.signals.instants import instant
 
-FEWEST: Final = 3
+FEWEST: Final = load_change.FOLLOWED
 """Fewer windows after a stop, over those without which no change is believed, cannot show what was
 loaded there [-]."""
 
