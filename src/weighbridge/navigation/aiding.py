@@ -35,7 +35,8 @@ _AT_ONCE = 1 << 12
 SLOWEST = 0.11
 """Inertial samples further apart lose what happens between them [s]. Twelve cars and vans with a
 sensor of 5 Hz scattered by 3.2 % (OBD at 4 Hz) and 7.4 % (1 Hz) with it, and 2.7 and 3.8 % without
-it (studies/car_equipment.md)."""
+it (studies/car_equipment.md). Twenty-four drives of 14 vehicles of the corpus with an accelerometer
+of 5 Hz and no gyroscope scattered by 5.7 %, and by 2.5 % without it."""
 
 
 @dataclass(frozen=True, slots=True)
