@@ -503,6 +503,9 @@ def test_after_a_stop_the_mass_of_before_is_as_unsure_as_its_load(
         scale.update_block(block)
         moves = speed.held(np.array([edge]))[0] > 1.0
         seen.append((edge, bool(moves), scale.weighing(), scale.weighing(ahead=True)))
+    kept = wb.LiveScale.restore(car, scale.checkpoint())
+    assert (kept._move.rested, kept._move.anew) == (scale._move.rested, scale._move.anew)
+    assert (scale._move.anew > 0.0) == (equipment == "no inertial sensor")
     stands = [k for k, (_, moves, *_) in enumerate(seen) if not moves]
     stop = max(np.split(stands, np.flatnonzero(np.diff(stands) > 1) + 1), key=len)
     stood = [seen[k][2] for k in stop[2:]]

@@ -9,7 +9,7 @@ from numpy.testing import assert_array_equal
 
 from weighbridge.estimators import ESTIMATORS
 from weighbridge.estimators.joint.load_stops import change_odds
-from weighbridge.estimators.joint.possible import FEWEST, PossibleChange, averaged
+from weighbridge.estimators.joint.possible import PossibleChange, averaged, enough_windows
 from weighbridge.estimators.joint.problem import UNMODELLED, FilterInput, filter_params
 from weighbridge.kernels import disturbance
 
@@ -89,7 +89,7 @@ def test_stops_without_a_change_widen_little():
 def test_where_nothing_can_be_told_nothing_is_changed():
     given = van(0.0)
     late = replace(given, odds=np.where(np.arange(WINDOWS) == 232, 1.0, np.nan))
-    assert FEWEST * SETTINGS.fewest_windows > WINDOWS - 232
+    assert enough_windows(SETTINGS) > WINDOWS - 232
     for none in (late, replace(given, odds=np.full(WINDOWS, np.nan))):
         state, _, possible = averaged(none, STD, SETTINGS, UNMODELLED)
         assert possible is None

@@ -10,7 +10,7 @@ import numpy as np
 from weighbridge.balance.averaging import WINDOW
 from weighbridge.balance.table import MOVING
 from weighbridge.estimators.joint import JointSettings
-from weighbridge.estimators.joint.possible import FEWEST
+from weighbridge.estimators.joint.possible import enough_windows
 from weighbridge.signals import Drive
 
 GAP: Final = 1.0
@@ -28,7 +28,7 @@ SLOWER: Final = 1.1
 GROWTH: Final = 1.5
 """and with a mass so many times as much [-]."""
 
-FOLLOWED: Final = FEWEST * JointSettings().fewest_windows * WINDOW
+FOLLOWED: Final = enough_windows(JointSettings()) * WINDOW
 """A look shows what was loaded at a stop after so long on the move [s]."""
 
 PERIOD: Final = 600.0

@@ -191,6 +191,7 @@ class LiveScale:
             "driven": self._move.driven,
             "driven_this_load": self._move.this_load,
             "rested": self._move.rested,
+            "driven_until_rest": self._move.anew,
             "kerb": self._kerb,
             "since": self._since,
             "tared": self._tared,
@@ -228,8 +229,9 @@ class LiveScale:
             scale._setup, scale._state = content["setup"], content["state"]
             scale._next, scale._learned = content["next"], content["learned"]
             scale._move = OnTheMove(
-                content["driven"], content["driven_this_load"], rested=content["rested"]
-            )
+                content["driven"], content["driven_this_load"], rested=content["rested"],
+                anew=content["driven_until_rest"],
+            )  # fmt: skip
             scale._kerb = content["kerb"]
             scale._since, scale._tared = content["since"], content["tared"]
             scale._learns, scale.kept_at = content["learns"], content["pace"]

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from weighbridge.estimators.joint.load_stops import CHANGE_ODDS, change_odds
-from weighbridge.estimators.joint.possible import averaged, enough_after
+from weighbridge.estimators.joint.possible import averaged, enough_windows
 from weighbridge.estimators.joint.problem import (
     FilterInput,
     JointSizes,
@@ -96,7 +96,7 @@ def resumed(given: FilterInput, setup: JointSetup, until: float) -> JointState:
     known = part.first(open_from)
     end, same, _ = averaged(known, setup.std, setup.settings, setup.std_factor)
     total = part.weight()
-    jumps = np.flatnonzero(part.added.any(axis=1))
+    jumps = np.flatnonzero(known.added.any(axis=1))
     before = part.first(int(jumps[-1])).weight() if jumps.size else 0.0
     load = load_change.initial_state(end)._replace(rows=open_from)  # type: ignore[no-untyped-call]
     mass, var = end.x[0], end.cov[0, 0]
@@ -125,9 +125,8 @@ def _open_from(given: FilterInput, setup: JointSetup) -> int:
     count = given.time.size
     changed = np.asarray(np.any(given.added > 0.0, axis=1))
     stops = np.flatnonzero((given.odds >= CHANGE_ODDS) | changed)
-    if not stops.size or changed[stops[-1]] or enough_after(int(stops[-1]), count, setup.settings):
-        return count
-    return int(stops[-1])
+    followed = count - enough_windows(setup.settings)
+    return int(stops[-1]) if stops.size and stops[-1] > followed else count
 
 
 class Window(NamedTuple):

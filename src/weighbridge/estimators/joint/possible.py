@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,10 +15,6 @@ from weighbridge.kernels import disturbance, load_change
 from weighbridge.messages import Problem, phrase
 from weighbridge.signals import Floats
 from weighbridge.signals.instants import instant
-
-FEWEST: Final = load_change.FOLLOWED
-"""Fewer windows after a stop, over those without which no change is believed, cannot show what was
-loaded there [-]."""
 
 MOST: Final = 40
 """Stops that are looked at, the longest first."""
@@ -92,9 +88,9 @@ class Averaged(NamedTuple):
     possible: PossibleChange | None
 
 
-def enough_after(stop: Any, count: int, settings: JointSettings) -> Any:
-    """Whether the windows from one on, or from each of several, show what was loaded before it."""
-    return count - stop >= FEWEST * settings.fewest_windows
+def enough_windows(settings: JointSettings) -> int:
+    """How many windows after a stop show what was loaded there."""
+    return load_change.FOLLOWED * settings.fewest_windows
 
 
 def averaged(given: FilterInput, std: Floats, settings: JointSettings, factor: float) -> Averaged:
@@ -130,7 +126,7 @@ def averaged(given: FilterInput, std: Floats, settings: JointSettings, factor: f
     changed = np.asarray(np.any(given.added > 0.0, axis=1))
     found = np.flatnonzero(np.isfinite(given.odds) & changed)
     stops = np.flatnonzero(np.isfinite(given.odds) & ~changed)
-    stops = stops[enough_after(stops, given.time.size, settings)]
+    stops = stops[given.time.size - stops >= enough_windows(settings)]
     stops = stops[np.argsort(-given.odds[stops], kind="stable")][:MOST]
     if not stops.size + found.size:
         return Averaged(same, same, None)
