@@ -40,7 +40,7 @@ from weighbridge.checks.vehicle import check_vehicle
 from weighbridge.navigation.along import with_forward_accel
 from weighbridge.navigation.clock_drift import correct_clocks
 from weighbridge.signals import Drive, Problem
-from weighbridge.signals.catalogue import REPORTED
+from weighbridge.signals.catalogue import REPORTED_LOAD
 from weighbridge.signals.held import without_repeats
 from weighbridge.signals.timeline import one_recording, well_formed
 from weighbridge.vehicle.model import Vehicle
@@ -84,16 +84,16 @@ def correct_drive(drive: Drive, vehicle: Vehicle | None = None) -> Drive:
     -------
     Drive
         On clocks that rise, within physical ranges, without samples that are false. What the
-        vehicle reports of its own load (`REPORTED`) changes none of it. What was found
+        vehicle reports of its own load (`REPORTED_LOAD`) changes none of it. What was found
         is added to its ``problems``, serious ones first. What is wrong with a signal that a person
         vouches for (``drive.info.trusted``) is never serious.
     """
-    found = _corrected(drive.without(*REPORTED), vehicle)
-    beside = drive.without(*(name for name in drive.signals if name not in REPORTED))
-    if not beside.signals:
+    found = _corrected(drive.without(*REPORTED_LOAD), vehicle)
+    beside = drive.without(*(name for name in drive.signals if name not in REPORTED_LOAD))
+    if not (beside.signals and found.signals):
         return found
-    told = within_ranges(well_formed(beside)).between(found.start, found.end)
-    return found.with_signals(*told.signals.values())
+    reported = within_ranges(well_formed(beside)).between(found.start, found.end)
+    return found.with_signals(*reported.signals.values())
 
 
 def _corrected(drive: Drive, vehicle: Vehicle | None) -> Drive:

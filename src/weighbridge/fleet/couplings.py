@@ -83,7 +83,7 @@ def with_couplings(legs: pl.DataFrame, couplings: Sequence[Coupling]) -> pl.Data
         },
         orient="row",
     ).sort("_start")
-    told = pl.col("trailer_connected").fill_null(value=False)
+    reported = pl.col("trailer_connected").fill_null(value=False)
     middle = pl.col("start") + (pl.col("end") - pl.col("start")) / 2
     rows = legs.with_row_index("_row").with_columns(_middle=middle)
     found = (
@@ -99,10 +99,10 @@ def with_couplings(legs: pl.DataFrame, couplings: Sequence[Coupling]) -> pl.Data
     return (
         rows.join(found, on="_row", how="left", maintain_order="left")
         .with_columns(
-            permitted_kg=pl.when(told & pl.col("_permitted").is_null())
+            permitted_kg=pl.when(reported & pl.col("_permitted").is_null())
             .then(None)
             .otherwise(pl.coalesce("_permitted", "gross_kg")),
-            coupled=pl.col("_permitted").is_not_null() | told,
+            coupled=pl.col("_permitted").is_not_null() | reported,
         )
         .drop("_row", "_middle", "_permitted")
     )

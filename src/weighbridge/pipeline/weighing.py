@@ -65,7 +65,6 @@ from weighbridge.pipeline.notes import (
 )
 from weighbridge.results.weighing import MassResult
 from weighbridge.signals import Drive
-from weighbridge.signals.catalogue import REPORTED
 from weighbridge.vehicle.as_read import as_read
 from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.power_balance import by_power
@@ -204,17 +203,6 @@ def weigh_checked(drive: Drive, vehicle: Vehicle, method: str, settings: Any = N
     drive, vehicle, method : as of `weigh`
     settings : of the estimator; its defaults when None
     """
-    told = [s for name, s in drive.signals.items() if name in REPORTED]
-    if not told:
-        return _weigh_with_or_without(drive, vehicle, method, settings)
-    found = _weigh_with_or_without(drive.without(*REPORTED), vehicle, method, settings)
-    drive = found.drive.with_signals(*told)
-    notes = towing(drive, found.result) if found.status is Status.CONVERGED else ()
-    return replace(found, drive=drive, problems=(*found.problems, *notes))
-
-
-def _weigh_with_or_without(drive: Drive, vehicle: Vehicle, method: str, settings: Any) -> Weighing:
-    """Weigh with the inertial sensor, or without it where it is to blame."""
     found = _weigh_all(drive, vehicle, method, settings)
     less, made = without_accelerometer(drive), found.estimator
     without = made.by_speed or made.speed_alone or len(less.signals) == len(drive.signals)
@@ -354,6 +342,8 @@ def weigh_balance(
                 status, reason = Status.INCONSISTENT, doubts.pop(0)
             doubts += [doubt, possible.note if possible is not None else None]
             problems += tuple(d for d in doubts if d is not None)
+    if status is Status.CONVERGED:
+        problems += towing(drive, result)
     return Weighing(
         drive=drive,
         vehicle=vehicle,

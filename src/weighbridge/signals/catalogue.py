@@ -163,7 +163,7 @@ TABLES: Final = ("imu", "obd", "gnss", "ride")
 IMU_SIGNALS: Final = tuple(q.name for q in _ROWS if q.table == "imu")
 """Specific force and angular rate along the three axes of an inertial sensor."""
 
-REPORTED: Final = ("maker_mass", "trailer_connected")
+REPORTED_LOAD: Final = ("maker_mass", "trailer_connected")
 """What a vehicle says of its own load. Results show it; no mass is made of it."""
 
 TIME_COLUMN: Final = "time_s"
