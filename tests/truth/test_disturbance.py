@@ -114,3 +114,17 @@ def test_smoothing_ends_where_the_filter_ends():
     x, var, *_ = kernel.smooth(start, time, rows, y, noise, NO_JUMPS, params)
     assert_allclose(x[-1], state.x, rtol=1e-12)
     assert_allclose(var[-1], np.diag(state.cov), rtol=1e-9)
+
+
+def test_a_false_row_after_a_jump_does_not_close_the_gate_to_right_ones():
+    time, rows, y, noise, params, start, _ = problem()
+    jumped = np.arange(y.size) >= 120
+    heavier = y + 400.0 * jumped * rows[:, 0]
+    heavier[120] += 900.0
+    added = np.zeros(rows.shape)
+    added[120, 0] = 300.0**2
+    gated = params._replace(gate=5.0, settle_rows=20, jump_rows=8)
+    state, _, _, _, taken = kernel.run(start, time, rows, heavier, noise, added, gated)
+    assert taken[120:128].all()
+    assert np.mean(taken[128:]) > 0.95
+    assert abs(state.x[0] - 1900.0) < 4.0 * np.sqrt(state.cov[0, 0])

@@ -28,7 +28,7 @@ def truck(*, launch_error=0.0, late_scale=1.0, told=True):
     rows = np.column_stack([phi, np.ones(WINDOWS), np.ones(WINDOWS), np.zeros((WINDOWS, 4))])
     return FilterInput(
         start=disturbance.initial_state(np.array([MASS, *6 * [0.0]]), np.diag(std**2), time[0]),
-        params=filter_params(std, 5.0, 10),
+        params=filter_params(std, 5.0, 10, 0),
         time=time,
         rows=np.ascontiguousarray(rows),
         y=force,

@@ -28,7 +28,7 @@ def van(change, *, at=120, every=12, stood=12.0, seed=0):
     time = 3.0 * k + np.cumsum(rest)
     return FilterInput(
         start=disturbance.initial_state(np.array([MASS, *6 * [0.0]]), np.diag(STD**2), time[0]),
-        params=filter_params(STD, SETTINGS.gate, SETTINGS.settle_windows),
+        params=filter_params(STD, SETTINGS.gate, SETTINGS.settle_windows, 0),
         time=time,
         rows=np.column_stack([phi, np.ones(WINDOWS), phi, np.zeros((WINDOWS, 4))]),
         y=mass * phi + rng.normal(0.0, NOISE, WINDOWS),

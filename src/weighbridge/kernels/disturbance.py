@@ -17,12 +17,14 @@ class DisturbanceParams(NamedTuple):
     std : (n,) stationary standard deviation of the fading states, 0 for constants
     gate : innovations beyond this many standard deviations are left out [-]
     settle_rows : rows before the gate closes
+    jump_rows : rows after a jump of a state before it closes again
     """
 
     time_constant: np.ndarray
     std: np.ndarray
     gate: float
     settle_rows: int
+    jump_rows: int = 0
 
 
 class DisturbanceState(NamedTuple):
@@ -154,7 +156,7 @@ def run(state, time, rows, y, noise_var, added, params):
     innovation = np.empty(y.size)
     taken = np.empty(y.size, dtype=np.bool_)
     for k in range(y.size):
-        state = inflated(state, added[k])
+        state = inflated(state, added[k], params)
         state, innovation[k], taken[k] = step(state, time[k], rows[k], y[k], noise_var[k], params)
         first[k] = state.x[0]
         first_var[k] = state.cov[0, 0]
@@ -181,7 +183,7 @@ def weighed(state, time, rows, columns, noise_var, added, params):
     x = np.zeros((count, state.x.size))
     cov_row = np.empty(state.x.size)
     for k in range(time.size):
-        state = inflated(state, added[k])
+        state = inflated(state, added[k], params)
         none, cov, left = faded(state, time[k], params)
         _, innovation_var = predicted(none, cov, rows[k], noise_var[k], cov_row)
         for j in range(count):
@@ -199,12 +201,18 @@ def weighed(state, time, rows, columns, noise_var, added, params):
 
 
 @inlined_kernel
-def inflated(state, variance):
-    """Return the state with ``variance`` (n,) added to those of the estimates."""
-    cov = state.cov.copy()
+def inflated(state, variance, params):
+    """Return the state with ``variance`` (n,) added to those of the estimates.
+
+    A state that jumps is known by the first rows after it alone. One of them that is false would
+    close the gate to the right ones, so that it is open to some, as at the beginning.
+    """
+    cov, rows = state.cov.copy(), state.rows
     for i in range(variance.size):
         cov[i, i] += variance[i]
-    return DisturbanceState(state.x, cov, state.time, state.rows, state.log_likelihood)
+        if variance[i] > 0.0:
+            rows = min(rows, params.settle_rows - params.jump_rows)
+    return DisturbanceState(state.x, cov, state.time, rows, state.log_likelihood)
 
 
 @kernel
@@ -219,7 +227,7 @@ def weights(state, time, rows, y, noise_var, added, params):
     """Sum of `weight` over all rows; parameters as of ``run``."""
     total = 0.0
     for k in range(y.size):
-        state = inflated(state, added[k])
+        state = inflated(state, added[k], params)
         total += weight(state, time[k], rows[k], noise_var[k], params)
         state, _, _ = step(state, time[k], rows[k], y[k], noise_var[k], params)
     return total
@@ -260,7 +268,7 @@ def smooth(state, time, rows, y, noise_var, added, params):
     error = np.zeros(m)
     weight = np.zeros(m)
     for k in range(m):
-        state = inflated(state, added[k])
+        state = inflated(state, added[k], params)
         x, cov, left = faded(state, time[k], params)
         state, _, taken[k] = step(state, time[k], rows[k], y[k], noise_var[k], params)
         if taken[k]:

@@ -116,7 +116,7 @@ def step(state, time, row, y, noise_var, odds, params):
     # Where stops come fast, the one at which a change is likeliest is tried until it can decide.
     if not np.isnan(odds) and not (young and odds <= state.prior):
         state, changed_from = decided(state, params)
-        moved = disturbance.inflated(state.same, params.jump_var)
+        moved = disturbance.inflated(state.same, params.jump_var, params.filter)
         state = LoadState(state.same, moved, True, odds, state.rows, state.rows)
     same, _, _ = disturbance.step(state.same, time, row, y, noise_var, params.filter)
     if state.open:

@@ -103,7 +103,7 @@ def step(state, time, row, y, noise_var, force, added, params):
     gain = np.empty(n)
     for i in range(2):
         held = disturbance.DisturbanceState(state.x[i], state.cov[i], state.time, state.rows, 0.0)
-        held = disturbance.inflated(held, added)
+        held = disturbance.inflated(held, added, params.filter)
         x, cov[i], _ = disturbance.faded(held, time, params.filter)
         mean, var = disturbance.predicted(x, cov[i], row, noise_var, gain)
         on = from_on if i == 1 else from_off
@@ -111,7 +111,7 @@ def step(state, time, row, y, noise_var, force, added, params):
         for j in range(2):
             error = y - mean - j * force
             size = abs(error) / np.sqrt(var)
-            taken = state.rows < params.filter.settle_rows or size <= gate
+            taken = held.rows < params.filter.settle_rows or size <= gate
             any_taken = any_taken or taken
             seen = min(size, gate)
             turned = on if j == 1 else 1.0 - on
@@ -122,17 +122,18 @@ def step(state, time, row, y, noise_var, force, added, params):
             for a in range(n):
                 for b in range(n):
                     cov[i, a, b] -= gain[a] * gain[b] / var
-    return _merged(state, time, moved, cov, chance)
+    return _merged(state, time, held.rows + 1, moved, cov, chance)
 
 
 @inlined_kernel
-def _merged(state, time, moved, cov, chance):
+def _merged(state, time, rows, moved, cov, chance):
     """Merge the ways to be off, and those to be on, by their moments.
 
     Parameters
     ----------
     state : before the row
     time : of the row [s]
+    rows : seen with it
     moved : (2, 2, n) estimates, by what the force was and by what it is
     cov : (2, n, n) by what it was
     chance : (2, 2) logarithm of the weight of each
@@ -161,7 +162,7 @@ def _merged(state, time, moved, cov, chance):
                     (1.0 - part) * cov[0, a, b] + part * cov[1, a, b] + part * (1.0 - part) * spread
                 )
     likelihood = state.log_likelihood + top + np.log(total)
-    return SwitchState(x_out, cov_out, share, chance, time, state.rows + 1, likelihood)
+    return SwitchState(x_out, cov_out, share, chance, time, rows, likelihood)
 
 
 @kernel

@@ -45,7 +45,9 @@ def first_state(
     start = disturbance.initial_state(  # type: ignore[no-untyped-call]
         begin, np.diag(std**2), time
     )
-    return start, filter_params(std, settings.gate, settings.settle_windows)
+    # No change of load is believed sooner.
+    params = filter_params(std, settings.gate, settings.settle_windows, settings.fewest_windows)
+    return start, params
 
 
 def jump_variance(std: Floats, settings: JointSettings) -> Floats:

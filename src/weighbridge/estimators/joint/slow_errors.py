@@ -285,7 +285,7 @@ def prior_std(
     return np.array(states)
 
 
-def filter_params(std: Floats, gate: float, settle_rows: int) -> DisturbanceParams:
+def filter_params(std: Floats, gate: float, settle_rows: int, jump_rows: int) -> DisturbanceParams:
     """Make the kernel's parameters from the standard deviations of the states."""
     lasting = np.full(std.size, np.inf)
     lasting[1 : 1 + len(TIME_CONSTANTS)] = TIME_CONSTANTS
@@ -294,4 +294,5 @@ def filter_params(std: Floats, gate: float, settle_rows: int) -> DisturbancePara
         std=np.where(np.isfinite(lasting), std, 0.0),
         gate=gate,
         settle_rows=settle_rows,
+        jump_rows=jump_rows,
     )
