@@ -196,6 +196,14 @@ def test_a_fault_in_mid_drive_is_survived_or_withdraws_the_mass(
         assert found.status is LiveStatus.INCONSISTENT
         assert np.isnan(found.mass)
         assert found.reason_id == "load.change_moving"
+        # Nor does it come back with the few records of after a restart.
+        again = wb.LiveScale.restore(car, scale.checkpoint())
+        few = loaded.drive.between(start, start + 12.0)
+        gone_by = loaded.drive.end + 60.0 - start
+        again.update_block({n: (s.time + gone_by, s.values) for n, s in few.signals.items()})
+        again.finish()
+        assert again.weighing().reason_id == "motion.few_rows"
+        assert np.isnan(again.weighing().mass)
         return
     assert max(abs(w.mass - true) / w.std for w in weighed) < 2.5
     if fault in (frozen, saturated) and set(names) <= set(IMU):

@@ -567,7 +567,10 @@ class LiveScale:
         self._learned = learned = look.found()
         why = "" if learned.refusal is None else learned.refusal.text
         _LOG.info("looked at %.0f s: %.0f kg %s", look.drive.duration, learned.mass, why)
-        if learned.inconsistent or math.isnan(learned.mass):
+        if learned.inconsistent:
+            # Records that show less later, after a restart say, do not make it right again.
+            self._setup = self._state = None
+        if math.isnan(learned.mass):
             return
         if learned.early is None and (self._setup is None or look.tells_more(self._since)):
             self._setup, self._state = learned.setup, look.state()
