@@ -587,7 +587,7 @@ def test_a_gyro_that_repeats_a_value_is_at_its_limit_only_where_that_is_the_high
 
 
 def test_an_hour_of_standstill_is_a_note():
-    t = np.arange(0.0, 3600.0, 0.5)
+    t = np.arange(0.0, 3600.0, 0.1)
     rng = np.random.default_rng(0)
     still = Drive(
         "still",
