@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -11,14 +12,13 @@ import numpy as np
 from weighbridge.errors import DriveError
 from weighbridge.io import mdf
 from weighbridge.io.channels import Channel, Recording, draft_of
-from weighbridge.io.columns import unit_suffix
 from weighbridge.io.dbc import Database, Found, is_readable, message_frames, physical
 from weighbridge.io.draft import Draft
 from weighbridge.io.formats import format_of, unreadable
 from weighbridge.io.frames import Frames
 from weighbridge.io.j1939 import decode_j1939, is_j1939
-from weighbridge.io.naming import recognise_all
 from weighbridge.io.obd import decode_obd
+from weighbridge.signals import Problem
 
 
 class NoFramesError(DriveError):
@@ -44,9 +44,12 @@ def draft_bus(path: Path, databases: Sequence[Database]) -> Draft:
     if form is None:
         raise DriveError(unreadable(path))
     if form.read is mdf.read_mdf:
-        found = mdf.recording_of(path)
-    else:
-        found = Recording([], frames=form.read(path, None, None).frames)
+        with mdf.opened(path) as found:
+            return _draft(path, found, databases)
+    return _draft(path, Recording([], frames=form.read(path, None, None).frames), databases)
+
+
+def _draft(path: Path, found: Recording, databases: Sequence[Database]) -> Draft:
     frames = found.frames
     if frames is None or not len(frames):
         raise NoFramesError(f"{path} has no CAN frames; leave --dbc out")
@@ -86,12 +89,15 @@ def _flags(databases: Sequence[Database]) -> dict[str, str]:
 
 
 def bus_channels(frames: Frames, databases: Sequence[Database]) -> list[Channel]:
-    """Take the signals of the databases' messages that are in the traffic.
-
-    Signals whose name is that of no quantity come without values.
-    """
-    entries = [
-        Found(message, signal, at[message.name])
+    """Signals of the databases' messages that are in the traffic, to be decoded where wanted."""
+    return [
+        Channel(
+            f"{message.name}.{signal.name}",
+            frames.time[at[message.name]],
+            np.empty(0),
+            str(signal.unit or ""),
+            load=partial(_decoded, frames, Found(message, signal, at[message.name])),
+        )
         for database in databases
         for at in (message_frames(frames, database),)
         for message in database.messages
@@ -99,16 +105,9 @@ def bus_channels(frames: Frames, databases: Sequence[Database]) -> list[Channel]
         for signal in message.signals
         if is_readable(signal)
     ]
-    units = [str(found.signal.unit or "") for found in entries]
-    names = [found.signal.name for found in entries]
-    channels = []
-    for found, unit, known in zip(
-        entries, units, recognise_all(names, [unit_suffix(u) for u in units]), strict=True
-    ):
-        name = f"{found.message.name}.{found.signal.name}"
-        time, values = np.zeros(1), np.full(1, np.nan)
-        if known.quantity:
-            values, at = physical(frames, found)
-            time = frames.time[at]
-        channels.append(Channel(name, time, values, unit))
-    return channels
+
+
+def _decoded(frames: Frames, found: Found, quantity: str) -> tuple[Channel, list[Problem]]:
+    values, at = physical(frames, found)
+    name = f"{found.message.name}.{found.signal.name}"
+    return Channel(name, frames.time[at], values, str(found.signal.unit or "")), []

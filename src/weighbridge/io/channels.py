@@ -66,6 +66,9 @@ class Channel:
     values : (n,) in ``unit``; NaN where there is none
     unit : as the log writes it; empty where it states none
     quantity : canonical name, where the format itself says what it is; ``unit`` is a suffix then
+    load : takes a channel that is left in the file out of it, for a quantity, and says what is odd;
+        its ``time`` is until then no more than as long. ``values`` are empty where they are no
+        numbers. None where the channel holds its values
     """
 
     name: str
@@ -73,6 +76,7 @@ class Channel:
     values: Floats
     unit: str = ""
     quantity: str = ""
+    load: Callable[[str], tuple[Channel, list[Problem]]] | None = None
 
 
 @dataclass(slots=True)
@@ -90,6 +94,7 @@ class Recording:
     time_format : how that time is written, as a mapping shows it; empty for numbers
     notes : what was left out or is not sure; a reader of another package may give sentences
     frames : raw bus traffic beside the channels
+    paths : whether names are places in the log, the last part of which may be canonical
     """
 
     channels: list[Channel]
@@ -101,6 +106,7 @@ class Recording:
     time_format: str = ""
     notes: list[Problem | str] = field(default_factory=list)
     frames: Frames | None = None
+    paths: bool = True
 
 
 Opener = Callable[[Path, TimeColumn], Recording]
@@ -186,13 +192,23 @@ def log_of(path: Path, found: Recording, table: str | None, mapping: TableMappin
         if name not in named:
             wanted.setdefault(name, entry)
     if not wanted and (found.frames is None or not len(found.frames)):
-        names = column_list(c.name for c in found.channels) if found.channels else "no channels"
+        names = column_list({c.name: c for c in found.channels}) or "no channels"
         source = f"that {mapping.source} names" if mapping and mapping.signals else "that is known"
         raise UnnamedError(f"{path} has no channel {source}; it has {names}", path)
     offset = mapping.time.offset if mapping is not None else 0.0
     clocks: dict[int, tuple[Floats, list[tuple[str, Floats]]]] = {}
     for name, (channel, suffix, signal) in wanted.items():
+        if (count := sum(c.name == channel.name for c in found.channels)) > 1:
+            log.problems.append(
+                Problem.of("file.channel_twice", file=path.name, name=channel.name, count=count)
+            )
+        if channel.load is not None:
+            channel, odd = channel.load(name)
+            log.problems += odd
         values = channel.values
+        if values.size < channel.time.size:
+            log.problems.append(Problem.of("file.no_number", name, file=path.name))
+            continue
         if signal is not None and (signal.factor != 1.0 or signal.offset != 0.0):
             values = values * signal.factor + signal.offset
         time, columns = clocks.setdefault(id(channel.time), (channel.time, []))
@@ -244,12 +260,16 @@ def _known(log: Log, found: Recording, table: str | None, taken: set[str]) -> _W
     """Channels that the format or a canonical name states; others not mapped are reported."""
     wanted: _Wanted = {}
     unknown: list[str] = []
+    longest: dict[str, Channel] = {}
     for channel in found.channels:
         if channel.quantity:
             wanted.setdefault(channel.quantity, (channel, channel.unit, None))
-            continue
+        elif channel.name not in longest or channel.time.size > longest[channel.name].time.size:
+            longest[channel.name] = channel
+    for channel in longest.values():
+        name = _last(channel.name) if found.paths else channel.name
         try:
-            column = parse_column(_last(channel.name), table, unit_suffix(channel.unit))
+            column = parse_column(name, table, unit_suffix(channel.unit))
         except UnitlessColumnError:
             column = None
         if column is not None:
@@ -306,6 +326,12 @@ def draft_of(path: Path, found: Recording) -> Draft:
     unnamed = [c for c in channels if not c.quantity]
     units = [stated_unit(c.unit) for c in unnamed]
     named = recognise_all([_reported(c.name) for c in unnamed], units, misfits=True)
+    loaded = {
+        c.name: c.load(n.quantity)[0]
+        for c, n in zip(unnamed, named, strict=True)
+        if c.load is not None and n.quantity
+    }
+    unnamed = [loaded.get(c.name, c) for c in unnamed]
     columns = checked(
         tuple(
             replace(draft_column(c.name, n, c.values, u), rate=usual_rate(c.time))
@@ -313,6 +339,8 @@ def draft_of(path: Path, found: Recording) -> Draft:
             if n.quantity not in known
         )
     )
+    # Channels that are left in the file have neither instants nor values.
+    channels = [c for c in (loaded.get(c.name, c) for c in channels) if c.load is None]
     columns = _judged(channels, columns)
     if known and not any(c.quantity for c in columns):
         raise DriveError(f"{path}: what is known of it is read as it is; it needs no mapping")
@@ -321,7 +349,6 @@ def draft_of(path: Path, found: Recording) -> Draft:
             f"{path}: none of its channels is known by its name; it has {column_list(counted)}: "
             "write [signals] of a mapping by hand"
         )
-    # Channels that stand for a name alone have no instants of their own.
     reported = [c for c in channels if c.quantity or np.isfinite(c.values).any()] or channels
     ends = [(float(np.nanmin(c.time)), float(np.nanmax(c.time))) for c in reported]
     doubts = [_noted(note).text for note in found.notes]

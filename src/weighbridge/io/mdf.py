@@ -14,41 +14,35 @@ import tempfile
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stdout
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from weighbridge.errors import DriveError, MissingExtraError
-from weighbridge.io.channels import Channel, Recording, draft_of
-from weighbridge.io.columns import UnitlessColumnError, parse_column, unit_suffix
+from weighbridge.io.channels import Channel, Recording, draft_of, log_of
 from weighbridge.io.draft import Draft
-from weighbridge.io.frames import Frames
+from weighbridge.io.frames import EXTENDED_MASK, Frames, in_order
 from weighbridge.io.info import MDF_INFO_MARK, parse_info
 from weighbridge.io.labels import physical_of
 from weighbridge.io.log import Log
-from weighbridge.io.mapping import (
-    MappedSignal,
-    TableMapping,
-    UnnamedError,
-    lacking,
-    resolved_unit,
-)
-from weighbridge.io.mdf_bus import bus_frames
+from weighbridge.io.mapping import TableMapping, UnnamedError
 from weighbridge.io.mdf_repair import Repaired, corrected, guard, settle
-from weighbridge.io.naming import recognise_all
-from weighbridge.io.table import column_list
 from weighbridge.messages import phrase
 from weighbridge.signals import DriveInfo, Floats, Problem
-from weighbridge.signals.cleaning import clean_columns
-from weighbridge.signals.tomlfile import Faults
-from weighbridge.signals.units import to_si
 
 # Channel groups of bus logging (ASAM MDF 4, bus logging), not of measurements.
 _BUS_PREFIXES: Final = ("CAN_", "LIN_", "FLX_", "ETH_", "MOST_")
 
 # Calendars of Python end with the year 9999 [s since 1970].
 _LAST_START: Final = 253_402_214_400.0
+
+_DATA_FRAME: Final = "CAN_DataFrame"
+_NUMBERS: Final = frozenset({"ID", "IDE", "DataLength", "DLC", "BusChannel"})
+# Bytes that a data length code means (ISO 11898-1).
+_DLC: Final = np.array([0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64], np.uint8)
 
 _Place = tuple[int, int]
 
@@ -64,16 +58,25 @@ def read_mdf(path: Path, table: str | None, mapping: TableMapping | None) -> Log
         asammdf is not installed.
     """
     with _file(path) as (file, kept):
-        log = _read(file, path, table, mapping)
+        found, raw_bus = _recording(file, path)
+        try:
+            log = log_of(path, found, table, mapping)
+        except UnnamedError:
+            if not raw_bus:
+                raise
+            raise DriveError(
+                f"{path} holds raw {raw_bus} bus frames and no CAN frame or measurement channel "
+                "that is known; decode it to signals first"
+            ) from None
+        log.info = _info(file, path)
     if kept:
         log.problems.insert(0, _reported(log, kept))
     return log
 
 
-def recording_of(path: Path) -> Recording:
-    """Hand over the channels of an MDF file and its CAN frames, to draft a mapping.
-
-    Only channels whose name is that of a quantity are read; of the others the name alone.
+@contextmanager
+def opened(path: Path) -> Iterator[Recording]:
+    """Hand over the channels of an MDF file and its CAN frames while it is open.
 
     Raises
     ------
@@ -81,22 +84,11 @@ def recording_of(path: Path) -> Recording:
         As of `read_mdf`.
     """
     with _file(path) as (file, kept):
-        every, raw_bus = _channels(file)
-        channels = {n: p for n, p in every.items() if not n.startswith(_BUS_PREFIXES)}
-        found = Recording([], start=_start(file))
+        found, _ = _recording(file, path)
+        found.channels = [c for c in found.channels if not c.name.startswith(_BUS_PREFIXES)]
         if kept:
             found.notes.append(Problem.of("file.cut_off"))
-        found.frames = _frames(file, path) if raw_bus else None
-        places = [_longest(file, places) for places in channels.values()]
-        units = [_unit_text(file, place) for place in places]
-        named = recognise_all(list(channels), [unit_suffix(u) for u in units])
-        for name, place, unit, known in zip(channels, places, units, named, strict=True):
-            time, values = np.zeros(1), None
-            if known.quantity:
-                time, values = _samples(file, path, place)
-            values = np.full(time.size, np.nan) if values is None else values
-            found.channels.append(Channel(name, time, values, unit))
-    return found
+        yield found
 
 
 def draft(path: Path) -> Draft:
@@ -107,13 +99,13 @@ def draft(path: Path) -> Draft:
     DriveError
         It has none, or none that is known by its name.
     """
-    found = recording_of(path)
-    if not found.channels and found.frames is not None:
-        raise DriveError(
-            f"{path} holds CAN frames only: give the DBC of their signals with --dbc; OBD-II and "
-            "J1939 are read without one (weighbridge inspect shows)"
-        )
-    return draft_of(path, found)
+    with opened(path) as found:
+        if not found.channels and found.frames is not None:
+            raise DriveError(
+                f"{path} holds CAN frames only: give the DBC of their signals with --dbc; OBD-II "
+                "and J1939 are read without one (weighbridge inspect shows)"
+            )
+        return draft_of(path, found)
 
 
 @contextmanager
@@ -194,66 +186,6 @@ def _unreadable(path: Path, reason: str) -> DriveError:
     )
 
 
-def _read(file: Any, path: Path, table: str | None, mapping: TableMapping | None) -> Log:
-    log = Log(path, start=_start(file), info=_info(file, path))
-    channels, raw_bus = _channels(file)
-    frames = _frames(file, path) if raw_bus else Frames.empty()
-    wanted = (
-        _mapped(log, channels, mapping, file) if mapping else _canonical(log, channels, table, file)
-    )
-    if len(frames):
-        log.frames = frames
-        # What is no channel may be a signal of the frames.
-        log.problems.clear()
-        log.lacking.clear()
-    if not wanted and len(frames):
-        return log
-    if not wanted:
-        if raw_bus:
-            raise DriveError(
-                f"{path} holds raw {raw_bus} bus frames and no CAN frame or measurement channel "
-                "that is known; decode it to signals first"
-            )
-        names = column_list(channels) if channels else "no channels"
-        hint = f"named in {mapping.source}" if mapping else "with a canonical name"
-        raise UnnamedError(f"{path} has no channel {hint}; it has {names}", path)
-    clocks: dict[int, list[tuple[str, Floats]]] = {}
-    times: dict[int, Floats] = {}
-    offset = mapping.time.offset if mapping else 0.0
-    for name, (place, suffix, signal) in wanted.items():
-        group = place[0]
-        time, values = _samples(file, path, place)
-        if values is None:
-            log.problems.append(Problem.of("file.no_number", name, file=path.name))
-            continue
-        channel = file.groups[group].channels[place[1]]
-        if channel.conversion is not None and (none := int(np.count_nonzero(np.isnan(values)))):
-            log.problems.append(
-                Problem.of(
-                    "file.sentinels",
-                    name,
-                    file=path.name,
-                    count=none,
-                    values=values.size,
-                    name=channel.name,
-                )
-            )
-        if signal is not None and (signal.factor != 1.0 or signal.offset != 0.0):
-            values = values * signal.factor + signal.offset
-        times.setdefault(group, time + offset if offset else time)
-        clocks.setdefault(group, []).append((name, to_si(values, suffix) if suffix else values))
-        log.units[name] = suffix
-    for group, columns in clocks.items():
-        if times[group].size == 0:
-            names = ", ".join(n for n, _ in columns)
-            log.problems.append(Problem.of("file.no_samples", file=path.name, names=names))
-            continue
-        signals, problems = clean_columns(times[group], columns, path.name)
-        log.signals += signals
-        log.problems += problems
-    return log
-
-
 def _start(file: Any) -> float | None:
     """When the file's clock began [s since 1970]; None where it was not set, or to no date."""
     try:
@@ -269,91 +201,102 @@ def _info(file: Any, path: Path) -> DriveInfo | None:
     return parse_info(text, path.name) if text.startswith(MDF_INFO_MARK) else None
 
 
-def _frames(file: Any, path: Path) -> Frames:
+def _bus_frames(file: Any, path: Path) -> Frames:
+    """All CAN data frames of a file, in the order of time since its start."""
+    parts = []
     try:
-        return bus_frames(file)
+        for g, group in enumerate(file.groups):
+            if not group.channel_group.cycles_nr:
+                continue
+            for c, channel in enumerate(group.channels):
+                # A frame is a structure of its fields; each of them is a channel, too.
+                if channel.name.startswith(_DATA_FRAME) and "." not in channel.name:
+                    found = file.get(group=g, index=c, ignore_invalidation_bits=True)
+                    if found.samples.dtype.names:
+                        parts.append(_frames(found.timestamps, found.samples))
+                    break
     # The library's errors on damaged data are of many kinds.
     except Exception as e:
         raise DriveError(
             f"{path}: its bus frames cannot be read ({_first_line(e)}); "
             "the file may have been cut off: copy it again"
         ) from None
+    several = len(parts) > 1
+    joined = in_order(parts)
+    return joined.select(np.argsort(joined.time, kind="stable")) if several else joined
 
 
-def _channels(file: Any) -> tuple[dict[str, list[_Place]], str]:
-    """All measurement channels, and the name of the raw bus if one was logged."""
-    found: dict[str, list[_Place]] = {}
+def _frames(time: NDArray[np.float64], samples: Any) -> Frames:
+    fields = {name.rpartition(".")[2]: samples[name] for name in samples.dtype.names}
+    count = time.size
+    for name in _NUMBERS & fields.keys():
+        if fields[name].shape != (count,) or fields[name].dtype.kind not in "biuf":
+            raise ValueError(f"field {name} of the frames is no number")
+    identifier = np.asarray(fields.get("ID", np.zeros(count)), np.uint32)
+    extended = fields["IDE"] != 0 if "IDE" in fields else identifier > 0x7FF
+    data = np.asarray(fields.get("DataBytes", np.zeros((count, 8))), np.uint8)
+    data = data.reshape(count, -1)[:, :64]
+    if data.shape[1] < 8:
+        data = np.pad(data, ((0, 0), (0, 8 - data.shape[1])))
+    if "DataLength" in fields:
+        length = fields["DataLength"]
+    elif "DLC" in fields:
+        length = _DLC[np.minimum(fields["DLC"], 15)]
+    else:
+        length = np.full(count, 8)
+    length = np.minimum(length, data.shape[1]).astype(np.uint8)
+    if (length < data.shape[1]).any():
+        data = np.where(np.arange(data.shape[1]) < length[:, None], data, 0).astype(np.uint8)
+    return Frames(
+        np.array(time, np.float64),
+        np.asarray(fields.get("BusChannel", np.ones(count)), np.int16),
+        identifier & np.uint32(EXTENDED_MASK),
+        np.asarray(extended, np.bool_),
+        length,
+        np.ascontiguousarray(data),
+    )
+
+
+def _recording(file: Any, path: Path) -> tuple[Recording, str]:
+    """Channels, which stay in the file until they are wanted, and the raw bus that was logged."""
+    found = Recording([], start=_start(file), paths=False)
     raw_bus = ""
+    clocks: dict[int, Floats] = {}
     for g, group in enumerate(file.groups):
         master = file.masters_db.get(g)
+        count = int(group.channel_group.cycles_nr)
         for c, channel in enumerate(group.channels):
             if c == master:
                 continue
             if channel.name.startswith(_BUS_PREFIXES) and "Frame" in channel.name:
-                if group.channel_group.cycles_nr:
-                    raw_bus = raw_bus or channel.name.split("_", 1)[0]
+                raw_bus = raw_bus or (channel.name.split("_", 1)[0] if count else "")
                 continue
-            found.setdefault(channel.name, []).append((g, c))
+            unit = _unit_text(channel)
+            load = partial(_loaded, file, path, (g, c), unit, clocks)
+            length = np.broadcast_to(0.0, count)
+            found.channels.append(Channel(channel.name, length, np.empty(0), unit, load=load))
+    if raw_bus:
+        frames = _bus_frames(file, path)
+        found.frames = frames if len(frames) else None
     return found, raw_bus
 
 
-def _longest(file: Any, places: list[_Place]) -> _Place:
-    return max(places, key=lambda p: int(file.groups[p[0]].channel_group.cycles_nr))
-
-
-_Wanted = dict[str, tuple[_Place, str, MappedSignal | None]]
-
-
-def _canonical(
-    log: Log, channels: dict[str, list[_Place]], table: str | None, file: Any
-) -> _Wanted:
-    wanted: _Wanted = {}
-    for name, places in channels.items():
-        place = _longest(file, places)
-        stated = unit_suffix(_unit_text(file, place))
-        try:
-            found = parse_column(name, table, stated)
-        except UnitlessColumnError as e:
-            raise DriveError(f"{log.path}: channel {name!r} {e}") from None
-        if found is None:
-            continue
-        quantity, suffix = found
-        if quantity.name not in wanted:
-            wanted[quantity.name] = (place, suffix, None)
-            _note_choice(log, name, places)
-    return wanted
-
-
-def _mapped(
-    log: Log, channels: dict[str, list[_Place]], mapping: TableMapping, file: Any
-) -> _Wanted:
-    wanted: _Wanted = {}
-    faults = Faults()
-    plain = {name.strip().casefold(): name for name in channels}
-    for s in mapping.signals:
-        name = s.column if s.column in channels else plain.get(s.column.strip().casefold())
-        if name is None:
-            if not s.optional:
-                log.lacking.append(lacking(f"{log.path.name}: channel", s, mapping.source))
-            continue
-        place = _longest(file, channels[name])
-        stated = unit_suffix(_unit_text(file, place))
-        with faults.gathered():
-            wanted[s.name] = (place, resolved_unit(s, stated, mapping.source), s)
-        _note_choice(log, name, channels[name])
-    faults.refuse()
-    return wanted
-
-
-def _note_choice(log: Log, name: str, places: list[_Place]) -> None:
-    if len(places) > 1:
-        log.problems.append(
-            Problem.of("file.channel_twice", file=log.path.name, name=name, count=len(places))
-        )
-
-
-def _unit_text(file: Any, place: _Place) -> str:
+def _loaded(
+    file: Any, path: Path, place: _Place, unit: str, clocks: dict[int, Floats], quantity: str
+) -> tuple[Channel, list[Problem]]:
+    """Read a channel; those of one group share their clock."""
+    time, values = _samples(file, path, place)
     channel = file.groups[place[0]].channels[place[1]]
+    odd = []
+    if values is None:
+        values = np.empty(0)
+    elif channel.conversion is not None and (none := int(np.count_nonzero(np.isnan(values)))):
+        about = {"file": path.name, "count": none, "values": values.size, "name": channel.name}
+        odd.append(Problem.of("file.sentinels", quantity, **about))
+    return Channel(channel.name, clocks.setdefault(place[0], time), values, unit), odd
+
+
+def _unit_text(channel: Any) -> str:
     if channel.unit:
         return str(channel.unit)
     conversion = channel.conversion
