@@ -90,8 +90,7 @@ def map_log(
     Example: weighbridge map trip.csv -o map.toml
     """
     from weighbridge.errors import DriveError
-    from weighbridge.io.draft_alike import kinds
-    from weighbridge.io.draft_speeds import with_compared_speeds
+    from weighbridge.io.drafts import kinds, with_compared_speeds
     from weighbridge.io.mapping_text import mapping_text
     from weighbridge.whole import whole_file
 
@@ -129,7 +128,7 @@ def map_log(
 def _tell_lacking(drafts: list[Draft], refused: dict[Path, str]) -> None:
     """Report files that were left out, and what no column was taken for."""
     from weighbridge.io.draft import tells_torque
-    from weighbridge.io.draft_missing import missing
+    from weighbridge.io.drafts import missing
 
     for sentence in refused.values():
         notice(f"  left out: {sentence}")

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
+import polars as pl
 
 from weighbridge.errors import DriveError
 from weighbridge.io.columns import (
@@ -24,6 +25,7 @@ from weighbridge.io.columns import (
 )
 from weighbridge.io.draft import Draft, draft_column
 from weighbridge.io.draft_column import DraftColumn, checked, usual_rate
+from weighbridge.io.draft_time import guessed_time_unit, text_time_format
 from weighbridge.io.draft_unit import Values, unit_in_name, with_judged_units
 from weighbridge.io.draft_values import with_judged_values
 from weighbridge.io.frames import Frames
@@ -36,12 +38,12 @@ from weighbridge.io.mapping import (
     lacking,
     resolved_unit,
 )
-from weighbridge.io.naming import recognise_all
-from weighbridge.io.table import column_list
+from weighbridge.io.naming import recognise_all, unit_of
+from weighbridge.io.table import RawTable, column_list, time_seconds, unwrapped
 from weighbridge.signals import Floats, Problem
 from weighbridge.signals.cleaning import clean_columns
 from weighbridge.signals.tomlfile import Faults
-from weighbridge.signals.units import to_si
+from weighbridge.signals.units import UNITS, to_si
 
 # Last parts of a name that say nothing of the quantity without the part before.
 _EMPTY_NAMES: Final = frozenset(
@@ -107,6 +109,55 @@ class Recording:
     notes: list[Problem | str] = field(default_factory=list)
     frames: Frames | None = None
     paths: bool = True
+
+    def add(
+        self, raw: RawTable, place: int, seconds: Floats, name: str, unit: str, factor: float = 1.0
+    ) -> None:
+        """Add a column of a table where it holds numbers.
+
+        Parameters
+        ----------
+        raw, place : the table, and where the column stands
+        seconds : (n,) of its rows [s]; NaN where the time is not known
+        name, unit : of the channel
+        factor : value of one count, in that unit
+        """
+        try:
+            values, notes = raw.numbers(place)
+        except DriveError:
+            return
+        there = np.isfinite(values) & np.isfinite(seconds)
+        if there.any():
+            self.notes += notes
+            self.channels.append(Channel(name, seconds[there], factor * values[there], unit))
+
+    def clock(
+        self, raw: RawTable, place: int, name: str, time: TimeColumn, stated: str | None = "s"
+    ) -> Floats:
+        """Read a column of a table as a clock, as a mapping shows it or as it looks [s].
+
+        Parameters
+        ----------
+        raw, place, name : the table, where the column stands, and what it is called
+        time : what a mapping says of it
+        stated : suffix of the unit where neither mapping nor name state one of time; None to judge
+            it by the values
+        """
+        texts, form = raw.column(place), time.format or ""
+        if not form and texts.dtype == pl.String:
+            sample = [t.strip() for t in texts.drop_nulls().head(200).to_list() if t.strip()]
+            form, doubts = text_time_format(sample)
+            self.notes += [d for d in doubts if d not in self.notes]
+        units = (time.unit, unit_of(name)[0], stated)
+        unit = next((u for u in units if u in UNITS and UNITS[u].dimension == "s"), "s")
+        if not form and not any(units):
+            values = raw.numbers(place)[0]
+            unit, _ = guessed_time_unit(name, values[np.isfinite(values)])
+        if self.time:
+            self.time_unit, self.time_format = ("" if form else unit), form
+        seconds, self.absolute, notes = time_seconds(raw, place, UNITS[unit].factor, form or None)
+        self.notes += [n for n in notes if n not in self.notes]
+        return seconds if self.absolute else unwrapped(seconds)
 
 
 Opener = Callable[[Path, TimeColumn], Recording]

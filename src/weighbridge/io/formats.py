@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Final
 
 from weighbridge.io import (
+    apps,
     blf,
     frame_text,
     gpx,
@@ -29,13 +30,9 @@ from weighbridge.io import (
     nmea,
     npy,
     openpilot,
-    racechrono,
-    sensor_logger,
     tabular,
     tdms,
-    tesla,
     tesla_fleet,
-    torque_pro,
     vbo,
 )
 from weighbridge.io.channels import drafter, reader
@@ -87,8 +84,8 @@ FORMATS: Final[tuple[Format, ...]] = (
     Format(
         name="RaceChrono CSV v3",
         suffixes=(".csv",),
-        read=racechrono.read_racechrono,
-        begins=racechrono.is_racechrono,
+        read=apps.read_racechrono,
+        begins=apps.is_racechrono,
         about="position, speeds and engine speed, by source",
         takes=Takes.PLAIN,
         draft=draft,
@@ -96,8 +93,8 @@ FORMATS: Final[tuple[Format, ...]] = (
     Format(
         name="Torque Pro CSV",
         suffixes=(".csv",),
-        read=torque_pro.read_torque_pro,
-        begins=torque_pro.is_torque_pro,
+        read=apps.read_torque_pro,
+        begins=apps.is_torque_pro,
         about="position, OBD values with the unit in their name",
         takes=Takes.PLAIN,
         draft=draft,
@@ -105,8 +102,8 @@ FORMATS: Final[tuple[Format, ...]] = (
     Format(
         name="Sensor Logger CSV",
         suffixes=(".csv",),
-        read=sensor_logger.read_sensor_logger,
-        begins=sensor_logger.is_sensor_logger,
+        read=apps.read_sensor_logger,
+        begins=apps.is_sensor_logger,
         about="total acceleration, rotation and location of a phone",
         takes=Takes.PLAIN,
         draft=draft,
@@ -114,8 +111,8 @@ FORMATS: Final[tuple[Format, ...]] = (
     Format(
         name="Tesla Track Mode CSV",
         suffixes=(".csv",),
-        read=tesla.read_track_mode,
-        begins=tesla.is_track_mode,
+        read=apps.read_track_mode,
+        begins=apps.is_track_mode,
         about="speed, position, accelerator, over all laps",
         takes=Takes.PLAIN,
         draft=draft,

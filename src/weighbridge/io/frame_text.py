@@ -26,7 +26,7 @@ from weighbridge.io.draft_time import is_clock, is_number, text_time_format
 from weighbridge.io.frames import Frames, in_order
 from weighbridge.io.log import Log, Reader
 from weighbridge.io.mapping import TableMapping
-from weighbridge.io.table import SEPARATORS, cells, unwrapped
+from weighbridge.io.table import SEPARATORS, cells, plain_head, unwrapped
 from weighbridge.io.understood import Lines
 from weighbridge.kernels.frame_text import (
     ALONE,
@@ -586,7 +586,6 @@ _TRUE: Final = "1 t true x e ext extended xtd yes"
 _PYTHON_CAN: Final = b"timestamp,arbitration_id,extended,remote,error,dlc,data"
 _GVRET: Final = re.compile(rb"^time ?stamp,id,extended,(?:dir,)?bus,len,d1,", re.IGNORECASE)
 _CLX_TIME: Final = "%Y%m%dT%H%M%S%3f"
-_BOM: Final = b"\xef\xbb\xbf"
 
 
 def is_frame_table(head: bytes) -> bool:
@@ -595,7 +594,7 @@ def is_frame_table(head: bytes) -> bool:
 
 
 def _head_lines(head: bytes) -> list[str]:
-    return head.removeprefix(_BOM)[:_SAMPLE].decode("utf-8", "replace").split("\n")
+    return plain_head(head[:_SAMPLE]).split("\n")
 
 
 def _table_header(lines: Sequence[str]) -> tuple[int, str, dict[str, int], list[int]] | None:

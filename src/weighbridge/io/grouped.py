@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 
 from weighbridge.errors import DriveError
-from weighbridge.io.channels import Channel, Recording, drafter, reader
+from weighbridge.io.channels import Recording, drafter, reader
 from weighbridge.io.columns import stated_unit, unit_suffix
 from weighbridge.io.draft_text import (
     decimal_mark,
@@ -24,23 +24,20 @@ from weighbridge.io.draft_text import (
     separator_of,
     usual_width,
 )
-from weighbridge.io.draft_time import guessed_time_unit, is_number, text_time_format
+from weighbridge.io.draft_time import is_number, text_time_format
 from weighbridge.io.log import Log
 from weighbridge.io.mapping import TableMapping, TimeColumn
-from weighbridge.io.naming import is_time, unit_of, words_of
+from weighbridge.io.naming import is_time, words_of
 from weighbridge.io.table import (
-    RawTable,
     TextFormat,
     cells,
     column_list,
     head,
+    plain_head,
     read_text,
-    time_seconds,
-    unwrapped,
 )
 from weighbridge.io.tabular import read_csv
 from weighbridge.signals import Floats
-from weighbridge.signals.units import UNITS
 
 _STAMPS: Final = frozenset(("stamp", "marke", "marque", "marca", "merk"))
 """What VCDS calls a stamp in the languages of its releases, beside the names of times."""
@@ -72,7 +69,7 @@ class _Header:
 
 def is_grouped(begin: bytes) -> bool:
     """Return whether a text begins as a table with several clocks."""
-    lines = begin.removeprefix(b"\xef\xbb\xbf").decode("utf-8", "replace").splitlines()
+    lines = plain_head(begin).splitlines()
     # The last line may be cut off.
     return _header(lines[:-1]) is not None
 
@@ -112,17 +109,9 @@ def open_grouped(path: Path, time: TimeColumn) -> Recording:
         if clock < 0 or clock == k:
             continue
         if clock not in clocks:
-            clocks[clock] = _seconds(raw, clock, header, time, found)
-        seconds = clocks[clock]
-        try:
-            values, notes = raw.numbers(k)
-        except DriveError:
-            continue
-        there = np.isfinite(values) & np.isfinite(seconds)
-        if there.any():
-            found.notes += notes
-            channel = Channel(header.names[k], seconds[there], values[there], header.units[k])
-            found.channels.append(channel)
+            name, unit = header.names[clock], stated_unit(header.units[clock])
+            clocks[clock] = found.clock(raw, clock, name, time, unit)
+        found.add(raw, k, clocks[clock], header.names[k], header.units[k])
     return found
 
 
@@ -211,26 +200,3 @@ def _names(row: Sequence[str], clocks: Sequence[int]) -> bool:
     said = [row[k] for k, c in enumerate(clocks) if c not in (-1, k) and row[k]]
     kinds = {cell.translate(_NUMBERED) for cell in said}
     return bool(said) and (len(kinds) > 1 or len(said) == 1)
-
-
-def _seconds(
-    raw: RawTable, place: int, header: _Header, time: TimeColumn, found: Recording
-) -> Floats:
-    """Times of one clock [s], as a mapping shows or as they look."""
-    name, form = header.names[place], time.format or ""
-    column = raw.column(place)
-    if not form and not column.dtype.is_numeric():
-        texts = [t.strip() for t in column.drop_nulls().head(200).to_list() if t.strip()]
-        form, doubts = text_time_format(texts)
-        found.notes += [d for d in doubts if d not in found.notes]
-    unit = time.unit or unit_of(name)[0] or stated_unit(header.units[place])
-    if unit is None or unit not in UNITS or UNITS[unit].dimension != "s":
-        unit = "s"
-        if not form:
-            values = raw.numbers(place)[0]
-            unit, _ = guessed_time_unit(name, values[np.isfinite(values)])
-    if found.time:
-        found.time_unit, found.time_format = ("" if form else unit), form
-    seconds, found.absolute, notes = time_seconds(raw, place, UNITS[unit].factor, form or None)
-    found.notes += [n for n in notes if n not in found.notes]
-    return seconds if found.absolute else unwrapped(seconds)

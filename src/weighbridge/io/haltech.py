@@ -10,15 +10,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Final
 
-import numpy as np
-
 from weighbridge.errors import DriveError
-from weighbridge.io.channels import Channel, Recording
+from weighbridge.io.channels import Recording
 from weighbridge.io.draft_time import is_clock
 from weighbridge.io.mapping import TimeColumn
-from weighbridge.io.table import TextFormat, head, read_text, time_seconds
+from weighbridge.io.table import TextFormat, head, plain_head, read_text, time_seconds
 
-_MARK: Final = b"%DataLog%"
 _HEAD_LINES: Final = 20_000
 
 _TYPES: Final = {
@@ -40,7 +37,7 @@ _TYPES: Final = {
 
 def is_haltech(begin: bytes) -> bool:
     """Return whether a text begins as Haltech's logs do."""
-    return begin.removeprefix(b"\xef\xbb\xbf").startswith(_MARK)
+    return plain_head(begin).startswith("%DataLog%")
 
 
 def open_haltech(path: Path, time: TimeColumn) -> Recording:
@@ -74,12 +71,6 @@ def open_haltech(path: Path, time: TimeColumn) -> Recording:
     seconds, _, notes = time_seconds(raw, 0, 1.0, "clock")
     found = Recording([], of_day=True, notes=[*raw.notes, *notes])
     for k, (name, kind) in enumerate(zip(names, types, strict=True), start=1):
-        try:
-            values = raw.numbers(k)[0]
-        except DriveError:
-            continue
         factor, unit = _TYPES.get(kind, (1.0, ""))
-        there = np.isfinite(values) & np.isfinite(seconds)
-        if there.any():
-            found.channels.append(Channel(name, seconds[there], factor * values[there], unit))
+        found.add(raw, k, seconds, name, unit, factor)
     return found

@@ -17,14 +17,13 @@ import numpy as np
 import polars as pl
 
 from weighbridge.errors import DriveError
-from weighbridge.io.channels import Channel, Recording
+from weighbridge.io.channels import Recording
 from weighbridge.io.draft_time import DraftTime, find_times
 from weighbridge.io.long_csv import are_long, recording_of
 from weighbridge.io.mapping import TimeColumn
-from weighbridge.io.table import MOST_COLUMNS, RawTable, column_list, time_seconds
+from weighbridge.io.table import MOST_COLUMNS, RawTable, column_list
 from weighbridge.io.tesla_fleet import records_of
 from weighbridge.io.understood import Lines
-from weighbridge.signals.units import UNITS
 
 _LIST: Final = re.compile(rb"\s*\[\s*\{")
 """Begins a list of records."""
@@ -101,27 +100,12 @@ def _flat(record: Mapping[str, Any], prefix: str, depth: int) -> Iterator[tuple[
 def _wide(raw: RawTable, time: TimeColumn) -> Recording:
     """Channels of records that each hold a row of values."""
     clock = _clock(raw, time)
-    unit = clock.unit or "s"
-    seconds, absolute, notes = time_seconds(
-        raw, clock.index, UNITS[unit].factor, clock.format or None
-    )
-    found = Recording(
-        [],
-        absolute=absolute,
-        time=clock.column,
-        time_unit="" if clock.format else unit,
-        time_format=clock.format,
-        notes=[*raw.notes, *notes],
-    )
+    found = Recording([], time=clock.column, notes=[*raw.notes])
+    shown = TimeColumn(unit=clock.unit or None, format=clock.format or None)
+    seconds = found.clock(raw, clock.index, clock.column, shown)
     for k, name in enumerate(raw.names):
-        try:
-            values = raw.numbers(k)[0]
-        except DriveError:
-            continue
-        there = np.isfinite(values) & np.isfinite(seconds)
-        if k != clock.index and there.any():
-            channel = Channel(name, seconds[there], values[there], raw.cell_unit(k))
-            found.channels.append(channel)
+        if k != clock.index:
+            found.add(raw, k, seconds, name, raw.cell_unit(k))
     return found
 
 

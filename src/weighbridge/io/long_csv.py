@@ -17,10 +17,10 @@ import polars as pl
 
 from weighbridge.errors import DriveError
 from weighbridge.io.channels import Channel, Recording
-from weighbridge.io.columns import bracketed_unit, time_unit, unit_suffix
+from weighbridge.io.columns import time_unit, unit_suffix
 from weighbridge.io.draft_time import counts_minutes, is_number, minutes_problem, text_time_format
 from weighbridge.io.mapping import TimeColumn
-from weighbridge.io.naming import is_time, recognise, unit_of, words_of
+from weighbridge.io.naming import is_time, recognise, words_of
 from weighbridge.io.table import (
     MOST_COLUMNS,
     SEPARATORS,
@@ -28,9 +28,8 @@ from weighbridge.io.table import (
     cells,
     column_list,
     numbers_with_units,
+    plain_head,
     read_text,
-    time_seconds,
-    unwrapped,
 )
 from weighbridge.messages import Problem, refused
 from weighbridge.signals import Floats
@@ -131,7 +130,7 @@ def _time_place(names: list[str], rows: Sequence[Sequence[str]] = ()) -> int | N
 
 def is_long(head: bytes) -> bool:
     """Return whether a text begins with the header of a long table."""
-    lines = head.removeprefix(b"\xef\xbb\xbf").decode("utf-8", "replace").split("\n")
+    lines = plain_head(head).split("\n")
     separator = max(SEPARATORS, key=lines[0].count)
     # The last line may be cut off.
     rows = [cells(line.strip("\r "), separator) for line in lines[:-1] if line.strip()]
@@ -309,23 +308,7 @@ def _seconds(raw: RawTable, names: list[str], time: TimeColumn, found: Recording
     found.time = name
     if counts_minutes(name):
         found.notes.append(minutes_problem(raw.path.name, name))
-    texts = raw.column(index)
-    found.time_format = time.format or ""
-    if not found.time_format and texts.dtype == pl.String:
-        sample = [t.strip() for t in texts.drop_nulls().head(200).to_list() if t.strip()]
-        found.time_format, doubts = text_time_format(sample)
-        found.notes += doubts
-    stated, _ = unit_of(name)
-    if stated is None or UNITS[stated].dimension != "s":
-        stated = bracketed_unit(name) or time_unit(name) or "s"
-    unit = time.unit or (stated if UNITS[stated].dimension == "s" else "s")
-    found.time_unit = "" if found.time_format else unit
-    seconds, found.absolute, notes = time_seconds(
-        raw, index, UNITS[unit].factor, found.time_format or None
-    )
-    found.notes += notes
-    # Seconds of a day begin anew at midnight.
-    return seconds if found.absolute else unwrapped(seconds)
+    return found.clock(raw, index, name, time)
 
 
 def _have_thousands(columns: list[pl.Series]) -> bool:

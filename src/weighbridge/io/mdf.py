@@ -291,7 +291,7 @@ def _loaded(
     if values is None:
         values = np.empty(0)
     elif channel.conversion is not None and (none := int(np.count_nonzero(np.isnan(values)))):
-        about = {"file": path.name, "count": none, "values": values.size, "name": channel.name}
+        about: dict[str, Any] = {"file": path.name, "count": none, "values": values.size, "name": channel.name}
         odd.append(Problem.of("file.sentinels", quantity, **about))
     return Channel(channel.name, clocks.setdefault(place[0], time), values, unit), odd
 

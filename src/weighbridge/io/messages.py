@@ -9,6 +9,7 @@ a status below 0 that there is no fix (the messages' own definitions).
 
 from __future__ import annotations
 
+import bz2
 import json
 from array import array
 from collections.abc import Callable, Iterator, Sequence
@@ -23,8 +24,7 @@ from typing import Any, Final, TypeAlias
 import numpy as np
 
 from weighbridge.errors import DriveError, MissingExtraError
-from weighbridge.io.bag_budget import bound_chunks
-from weighbridge.io.channels import Channel, Recording, check_unpacked
+from weighbridge.io.channels import Channel, Recording, check_unpacked, most_unpacked
 from weighbridge.io.mapping import TimeColumn
 from weighbridge.io.quiet import first_line
 from weighbridge.io.table import column_list, since_1970
@@ -213,7 +213,7 @@ def open_bag(path: Path, time: TimeColumn) -> Recording:
     def messages() -> Iterator[_Message]:
         with (Reader1 if one else Reader2)(path) as bag:
             if one:
-                bound_chunks(path, bag)
+                _bound_chunks(path, bag)
             for connection, logged, data in bag.messages():
                 name, defined = connection.topic, connection.msgdef
                 make = partial(_ros_topic, name, connection.msgtype, defined.data, one)
@@ -429,3 +429,45 @@ def _json_stamp(message: Any) -> float:
     if isinstance(stamp, dict) and "sec" in stamp:
         return float(stamp["sec"]) + 1e-9 * float(stamp.get("nsec", 0))
     return np.nan
+
+
+def _bound_chunks(path: Path, bag: Any) -> None:
+    """Let the chunks of an open ROS 1 bag unpack to `most_unpacked` in all.
+
+    A chunk beyond raises `DriveError` when it is reached.
+    """
+    sizes: dict[int, int] = {}
+
+    def bounded(place: int, unpack: Callable[[bytes, int], bytes]) -> Callable[[bytes], bytes]:
+        def decompress(data: bytes) -> bytes:
+            # A chunk may be read again, where its messages lie among those of others.
+            others = sum(size for at, size in sizes.items() if at != place)
+            found = unpack(data, most_unpacked(path) - others + 1)
+            sizes[place] = len(found)
+            check_unpacked(path, others + len(found))
+            return found
+
+        return decompress
+
+    known = {bz2.decompress: _bz2, _library_lz4(): _lz4}
+    for place, chunk in bag.chunks.items():
+        if chunk.decompressor in known:
+            unpack = bounded(place, known[chunk.decompressor])
+            bag.chunks[place] = chunk._replace(decompressor=unpack)
+
+
+def _library_lz4() -> Callable[[bytes], bytes]:
+    from lz4.frame import decompress
+
+    found: Callable[[bytes], bytes] = decompress
+    return found
+
+
+def _bz2(data: bytes, most: int) -> bytes:
+    return bz2.BZ2Decompressor().decompress(data, max_length=most)
+
+
+def _lz4(data: bytes, most: int) -> bytes:
+    from lz4.frame import LZ4FrameDecompressor
+
+    return bytes(LZ4FrameDecompressor().decompress(data, max_length=most))

@@ -336,6 +336,11 @@ def head(path: Path, count: int) -> list[str]:
     return [line.rstrip("\r") for line in text.split("\n", count)[:count]]
 
 
+def plain_head(begin: bytes) -> str:
+    """First bytes of a file as text, without a mark of its encoding."""
+    return begin.decode("utf-8", "replace").removeprefix("\ufeff")
+
+
 def cells(line: str, separator: str) -> list[str]:
     """Split a line at its separators, quotes taken off where they are closed."""
     try:

@@ -1,0 +1,312 @@
+"""Tables that apps and cars write, by the names that they give to their columns.
+
+RaceChrono CSV v3: a line that names the app, ``Format,3``, further ``key,value`` lines, then one
+row of names, one of units and one of sources (``100: gps``, ``200: obd``, ``calc``); times count
+from 1970. No specification is published; the form is that of exports of versions 9 and 10.
+
+Torque Pro track logs, about one row a second: names as the app writes them in English, each with
+its unit in the last brackets. The time is the phone's, in its zone.
+
+Sensor Logger (Kelvin Choi), one CSV for each sensor of a phone: names, units and signs are those of
+the app's own reference pages (UNITS.md and COORDINATES.md of tszheichoi/awesome-sensor-logger):
+``time`` in nanoseconds since 1970, m/s², rad/s, negative speed, bearing and accuracy meaning
+invalid. Acceleration with gravity is ``TotalAcceleration.csv``, of Android alone; on iOS the sign
+of acceleration depends on a setting, so it is left out.
+
+Tesla Track Mode, ``telemetry-v1-….csv`` on a car's USB drive: the columns are those of files that
+owners published (github.com/adrianco/r-tesla-telemetry). The elapsed time is that of the lap and
+begins anew with each. Power and brake pressure are none of the quantities of a drive.
+
+Acceleration and rotation of RaceChrono, Torque Pro and Track Mode are left out: their signs, and
+whether gravity is in them, are not documented.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from weighbridge.errors import DriveError
+from weighbridge.io.columns import bracketed_unit, dimension_of, unit_suffix
+from weighbridge.io.log import Log
+from weighbridge.io.mapping import MappedSignal, TableMapping, TimeColumn
+from weighbridge.io.table import RawTable, TextFormat, column_list, plain_head, read_text
+from weighbridge.io.tabular import read_mapped
+from weighbridge.signals import QUANTITIES, Floats, Problem
+from weighbridge.signals.cleaning import clean_columns
+from weighbridge.signals.units import UNITS, to_si
+
+_Column = tuple[str, int, str]
+"""Quantity, place of its column, and suffix of its unit."""
+
+
+def _columns(log: Log, raw: RawTable, wanted: Iterable[_Column]) -> dict[str, Floats]:
+    """Read columns in SI, by quantity; what is odd of them is reported."""
+    log.problems += [note.at(log.path.name) for note in raw.notes]
+    found = {}
+    for quantity, place, suffix in wanted:
+        values, notes = raw.numbers(place)
+        log.problems += [note.at(log.path.name, quantity) for note in notes]
+        found[quantity] = to_si(values, suffix)
+    return found
+
+
+def _cleaned(log: Log, time: Floats, columns: dict[str, Floats]) -> Log:
+    log.signals, problems = clean_columns(time, list(columns.items()), log.path.name)
+    log.problems += problems
+    return log
+
+
+def _unknown(raw: RawTable) -> DriveError:
+    return DriveError(f"{raw.path} has no column that is known; it has {column_list(raw.names)}")
+
+
+# RaceChrono ---------------------------------------------------------------------------------------
+
+_RACECHRONO: Final = {
+    ("latitude", "gps"): "latitude",
+    ("longitude", "gps"): "longitude",
+    ("altitude", "gps"): "altitude",
+    ("speed", "gps"): "gnss_speed",
+    ("bearing", "gps"): "gnss_course",
+    ("accuracy", "gps"): "gnss_accuracy",
+    ("speed", "obd"): "vehicle_speed",
+    ("speed", "canbus"): "vehicle_speed",
+    ("rpm", "obd"): "engine_speed",
+    ("rpm", "canbus"): "engine_speed",
+}
+"""Quantity by name of the column and kind of source."""
+
+
+def is_racechrono(head: bytes) -> bool:
+    """Return whether a file begins as RaceChrono's exports do."""
+    return plain_head(head).startswith("This file is created using RaceChrono")
+
+
+def read_racechrono(path: Path, table: str | None, mapping: TableMapping | None) -> Log:
+    """Read a RaceChrono CSV; see `weighbridge.io.log.Reader`.
+
+    Raises
+    ------
+    DriveError
+        Another version of the format, or none of its columns is known.
+    """
+    lines = path.read_bytes().decode("utf-8", errors="replace").splitlines()
+    version = next((x for line in lines[:20] if (x := re.match(r"Format,\"?(\d+)", line))), None)
+    if version is not None and version.group(1) != "3":
+        raise DriveError(
+            f"{path} is RaceChrono CSV v{version.group(1)}; export the session as CSV v3"
+        )
+    top = next((k for k, line in enumerate(lines) if line.startswith("timestamp,")), None)
+    if top is None or len(lines) < top + 3:
+        raise DriveError(f"{path} has no row of names that begins with timestamp; export it again")
+    raw = read_text(path, TextFormat(separator=",", skip_rows=top, skip_after_header=2))
+    count = len(raw.names)
+    units, sources = (
+        [*(c.strip().strip('"') for c in lines[top + k].split(",")), *[""] * count] for k in (1, 2)
+    )
+    log = Log(path, absolute=True)
+    wanted: dict[str, _Column] = {}
+    ignored = []
+    odd = []
+    for k, name in enumerate(raw.names[1:], start=1):
+        kind = sources[k].rsplit(":", 1)[-1].strip().lower()
+        quantity = _RACECHRONO.get((name.lower(), kind), "")
+        if not quantity or quantity in wanted:
+            ignored.append(f"{name} ({kind})" if kind else name)
+        elif (suffix := unit_suffix(units[k])) is not None and _fits(quantity, suffix):
+            wanted[quantity] = (quantity, k, suffix)
+        else:
+            about: dict[str, Any] = {"file": path.name, "name": name, "unit": units[k]}
+            odd.append(Problem.of("file.unknown_unit", quantity, **about))
+    columns = _columns(log, raw, wanted.values())
+    if not columns:
+        raise _unknown(raw)
+    log.problems += odd
+    if ignored:
+        log.problems.append(
+            Problem.of("file.ignored", file=path.name, columns=column_list(ignored))
+        )
+    return _cleaned(log, raw.numbers(0)[0], columns)
+
+
+def _fits(quantity: str, unit: str | None) -> bool:
+    """Whether a quantity can be in a unit."""
+    known = QUANTITIES[quantity]
+    return not known.suffix or (unit in UNITS and UNITS[unit].dimension == dimension_of(known))
+
+
+# Torque Pro ---------------------------------------------------------------------------------------
+
+_TORQUE_PRO: Final = (
+    ("longitude", "longitude", "deg"),
+    ("latitude", "latitude", "deg"),
+    ("gps speed", "gnss_speed", None),
+    ("horizontal dilution of precision", "hdop", ""),
+    ("altitude", "altitude", "m"),
+    ("bearing", "gnss_course", "deg"),
+    ("speed (obd)", "vehicle_speed", None),
+    ("engine rpm", "engine_speed", "rpm"),
+    ("engine load", "engine_load", "pct"),
+    ("throttle position(manifold)", "throttle", "pct"),
+    ("mass air flow rate", "mass_air_flow", None),
+    ("intake manifold pressure", "intake_pressure", None),
+    ("ambient air temp", "ambient_temperature", None),
+)
+"""Beginning of a column's name up to its unit, quantity, unit where the name has none."""
+
+
+def is_torque_pro(head: bytes) -> bool:
+    """Return whether a file begins as Torque Pro's track logs do."""
+    names = [c.strip().lower() for c in plain_head(head).split("\n", 1)[0].split(",")]
+    return names[:2] == ["gps time", "device time"]
+
+
+def read_torque_pro(path: Path, table: str | None, mapping: TableMapping | None) -> Log:
+    """Read a Torque Pro track log; see `weighbridge.io.log.Reader`.
+
+    Raises
+    ------
+    DriveError
+        No column is known, or the time is in another language or form.
+    """
+    text = TextFormat(separator=",", missing=("-", "∞"))
+    raw = read_text(path, text)
+    found: dict[str, MappedSignal] = {}
+    for name in raw.names:
+        plain = " ".join(name.lower().split())
+        for start, quantity, unit in _TORQUE_PRO:
+            rest = plain.removeprefix(start).strip()
+            if not plain.startswith(start) or (rest and not rest.startswith("(")):
+                continue
+            stated = bracketed_unit(name) or unit
+            if stated is None:
+                stated = unit_suffix(rest.strip("() "))
+            if quantity not in found and _fits(quantity, stated):
+                found[quantity] = MappedSignal(
+                    name=quantity, column=name, unit=stated or None, optional=True
+                )
+    if not found:
+        raise DriveError(
+            f"{path} has no column of Torque Pro that is known; it has {column_list(raw.names)}: "
+            "name them in a mapping file"
+        )
+    own = TableMapping(
+        files="*",
+        text=text,
+        time=TimeColumn(column=raw.names[1], format="%d-%b-%Y %H:%M:%S%.f"),
+        signals=tuple(found.values()),
+        source="Torque Pro",
+    )
+    return read_mapped(raw, own)
+
+
+# Sensor Logger ------------------------------------------------------------------------------------
+
+_SENSOR_LOGGER: Final = {
+    "totalacceleration": tuple((a, f"accel_{a}", "mps2", False) for a in "xyz"),
+    "gyroscope": tuple((a, f"gyro_{a}", "radps", False) for a in "xyz"),
+    "location": (
+        ("latitude", "latitude", "deg", False),
+        ("longitude", "longitude", "deg", False),
+        ("altitude", "altitude", "m", False),
+        ("speed", "gnss_speed", "mps", True),
+        ("bearing", "gnss_course", "deg", True),
+        ("horizontalAccuracy", "gnss_accuracy", "m", True),
+    ),
+}
+"""By file: column, quantity, unit, and whether negative values are invalid."""
+
+
+def is_sensor_logger(head: bytes) -> bool:
+    """Return whether a file begins as Sensor Logger's do."""
+    begins = plain_head(head).replace('"', "")
+    return begins.startswith(("time,seconds_elapsed,", "version,device name,"))
+
+
+def read_sensor_logger(path: Path, table: str | None, mapping: TableMapping | None) -> Log:
+    """Read one file of a Sensor Logger recording; see `weighbridge.io.log.Reader`.
+
+    Files of other sensors give no signals and a note.
+    """
+    log = Log(path, absolute=True)
+    known = _SENSOR_LOGGER.get(path.stem.lower())
+    if known is None:
+        if path.stem.lower() == "accelerometer":
+            log.problems.append(Problem.of("file.no_gravity", file=path.name))
+        return log
+    raw = read_text(path, TextFormat(separator=","))
+    places = ((quantity, raw.index(name), unit) for name, quantity, unit, _ in known)
+    columns = _columns(log, raw, [(q, k, unit) for q, k, unit in places if k is not None])
+    for _, quantity, _, positive in known:
+        if positive and quantity in columns:
+            columns[quantity] = np.where(columns[quantity] < 0.0, np.nan, columns[quantity])
+    columns = {q: values for q, values in columns.items() if np.isfinite(values).any()}
+    return _cleaned(log, raw.numbers(0)[0] * 1e-9, columns)
+
+
+# Tesla Track Mode ---------------------------------------------------------------------------------
+
+_LAP: Final = "Lap"
+_TIME: Final = "Elapsed Time (ms)"
+_TRACK_MODE: Final = {
+    "speed (mph)": ("vehicle_speed", "mph"),
+    "speed (kph)": ("vehicle_speed", "kmh"),
+    "speed (km/h)": ("vehicle_speed", "kmh"),
+    "latitude (decimal)": ("latitude", "deg"),
+    "longitude (decimal)": ("longitude", "deg"),
+    "throttle position (%)": ("accelerator_pedal", "pct"),
+}
+
+
+def is_track_mode(head: bytes) -> bool:
+    """Return whether a CSV begins as Tesla's Track Mode writes it."""
+    return plain_head(head).startswith(f"{_LAP},{_TIME},Speed (")
+
+
+def read_track_mode(path: Path, table: str | None, mapping: TableMapping | None) -> Log:
+    """Read a Track Mode CSV; see `weighbridge.io.log.Reader`.
+
+    Raises
+    ------
+    DriveError
+        None of its columns is known.
+    """
+    raw = read_text(path, TextFormat(separator=","))
+    log = Log(path)
+    known = ((_TRACK_MODE.get(name.strip().lower()), k) for k, name in enumerate(raw.names))
+    columns = _columns(log, raw, [(entry[0], k, entry[1]) for entry, k in known if entry])
+    if not columns:
+        raise _unknown(raw)
+    place = ("latitude", "longitude")
+    if columns.keys() >= set(place):
+        # A place at the crossing of equator and zero meridian is none.
+        nowhere = (columns["latitude"] == 0.0) & (columns["longitude"] == 0.0)
+        columns |= {name: np.where(nowhere, np.nan, columns[name]) for name in place}
+    laps, elapsed = (raw.numbers(raw.names.index(name))[0] for name in (_LAP, _TIME))
+    return _cleaned(log, _session_time(laps, elapsed * 1e-3), columns)
+
+
+def _session_time(laps: Floats, elapsed: Floats) -> Floats:
+    """Count on over laps whose time begins anew.
+
+    Parameters
+    ----------
+    laps : (n,) number of the lap
+    elapsed : (n,) time since the lap began [s]
+
+    Returns
+    -------
+    (n,) time since the first row's lap began [s]; between two laps lies the usual step
+    """
+    step = np.diff(elapsed)
+    rising = step[step > 0.0]
+    usual = float(np.median(rising)) if rising.size else 0.0
+    turns = np.flatnonzero((np.diff(laps) != 0.0) & (step < 0.0))
+    shift = np.zeros(elapsed.size)
+    shift[turns + 1] = usual - step[turns]
+    return elapsed + np.cumsum(shift)
