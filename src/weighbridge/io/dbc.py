@@ -16,9 +16,10 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from weighbridge.errors import ConfigError, MissingExtraError
+from weighbridge.errors import ConfigError
 from weighbridge.io.frames import Frames
 from weighbridge.io.labels import is_no_value
+from weighbridge.io.libraries import importing
 from weighbridge.signals import Bools, Floats, Problem
 
 DbcSource = str | Path
@@ -131,10 +132,8 @@ def load_dbcs(sources: Sequence[DbcSource]) -> tuple[Database, ...]:
     """
     if not sources:
         return ()
-    try:
+    with importing("cantools", "can", f"reading {sources[0]}"):
         import cantools
-    except ImportError:
-        raise MissingExtraError("cantools", "can", f"reading {sources[0]}") from None
     # It warns of what decoding does not need.
     logging.getLogger("cantools").setLevel(logging.ERROR)
     databases = []

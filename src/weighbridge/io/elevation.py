@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from weighbridge.arguments import check_path, check_type
-from weighbridge.errors import DriveError, MissingExtraError
+from weighbridge.errors import DriveError
+from weighbridge.io.libraries import importing
 from weighbridge.messages import Problem
 from weighbridge.signals import Drive, Floats, Signal
 
@@ -95,12 +96,10 @@ def refuse_raster(path: Path) -> None:
 
 def _heights(path: Path, latitude: Floats, longitude: Floats) -> Floats:
     """Heights at places (n,) in degrees [m], between the middles of four cells; NaN without."""
-    try:
+    with importing("rasterio", "elevation", f"reading heights of {path}"):
         import rasterio
         from rasterio.errors import NotGeoreferencedWarning, RasterioError
         from rasterio.warp import transform
-    except ImportError:
-        raise MissingExtraError("rasterio", "elevation", f"reading heights of {path}") from None
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", NotGeoreferencedWarning)

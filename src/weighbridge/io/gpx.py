@@ -10,7 +10,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from weighbridge.errors import DriveError, MissingExtraError
+from weighbridge.errors import DriveError
+from weighbridge.io.libraries import importing
 from weighbridge.io.log import Log
 from weighbridge.io.mapping import TableMapping
 from weighbridge.io.understood import Lines
@@ -49,11 +50,9 @@ def read_gpx(path: Path, table: str | None, mapping: TableMapping | None) -> Log
     MissingExtraError
         gpxpy is not installed.
     """
-    try:
+    with importing("gpxpy", "position", f"reading {path.name}"):
         import gpxpy
         import gpxpy.gpx
-    except ImportError:
-        raise MissingExtraError("gpxpy", "position", f"reading {path.name}") from None
     data = path.read_bytes()
     if b"<!ENTITY" in data or b"<!DOCTYPE" in data:
         raise DriveError(

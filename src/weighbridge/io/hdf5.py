@@ -7,10 +7,10 @@ from typing import Any, Final
 
 import numpy as np
 
-from weighbridge.errors import DriveError, MissingExtraError
+from weighbridge.errors import DriveError
 from weighbridge.io.channels import Recording, check_unpacked
+from weighbridge.io.libraries import importing, parsing
 from weighbridge.io.mapping import TimeColumn
-from weighbridge.io.quiet import first_line
 from weighbridge.io.table import MOST_COLUMNS
 from weighbridge.io.trees import Leaf, Tree, recording_of
 
@@ -28,10 +28,8 @@ def open_hdf5(path: Path, time: TimeColumn) -> Recording:
     MissingExtraError
         h5py is not installed.
     """
-    try:
+    with importing("h5py", "hdf5", f"reading {path.name}"):
         import h5py
-    except ImportError:
-        raise MissingExtraError("h5py", "hdf5", f"reading {path.name}") from None
     size = path.stat().st_size
     root: dict[str, Any] = {}
     sets: dict[str, Any] = {}
@@ -54,22 +52,12 @@ def open_hdf5(path: Path, time: TimeColumn) -> Recording:
             home = home.setdefault(group, {})
         home.update(_leaves(name, node))
 
-    try:
-        with h5py.File(path, "r") as file:
-            # Links to other places are not followed.
-            file.visititems(take)
-            check_unpacked(path, sum(_bytes(node) for node in sets.values()))
-            for place, node in sets.items():
-                read(place, node)
-    except DriveError:
-        raise
-    # The library's errors on damaged files are of many kinds.
-    except Exception as e:
-        reason = first_line(e) or type(e).__name__
-        raise DriveError(
-            f"{path} is not a readable HDF5 file ({reason}); it may have been cut off: copy it "
-            "again"
-        ) from None
+    with parsing(path, "HDF5 file"), h5py.File(path, "r") as file:
+        # Links to other places are not followed.
+        file.visititems(take)
+        check_unpacked(path, sum(_bytes(node) for node in sets.values()))
+        for place, node in sets.items():
+            read(place, node)
     return recording_of(path, root, time)
 
 

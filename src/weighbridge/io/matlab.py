@@ -14,10 +14,10 @@ from typing import Any, Final, Literal
 
 import numpy as np
 
-from weighbridge.errors import DriveError, MissingExtraError
 from weighbridge.io.channels import Recording, check_unpacked
+from weighbridge.io.libraries import importing, parsing
 from weighbridge.io.mapping import TimeColumn
-from weighbridge.io.quiet import first_line, quietly
+from weighbridge.io.quiet import quietly
 from weighbridge.io.trees import Leaf, Tree, recording_of, unit_beside
 from weighbridge.messages import Problem
 
@@ -43,12 +43,10 @@ def open_mat(path: Path, time: TimeColumn) -> Recording:
     MissingExtraError
         pymatreader or h5py is not installed.
     """
-    try:
+    with importing("pymatreader", "mat", f"reading {path.name}"):
         import h5py
         from pymatreader import read_mat
-    except ImportError:
-        raise MissingExtraError("pymatreader", "mat", f"reading {path.name}") from None
-    try:
+    with parsing(path, "MATLAB file"):
         if h5py.is_hdf5(path):
             with h5py.File(path, "r") as file:
                 _check_sets(path, file, h5py.Dataset)
@@ -57,15 +55,6 @@ def open_mat(path: Path, time: TimeColumn) -> Recording:
             # Of objects that it cannot read the library warns; they are missed by their names.
             warnings.simplefilter("ignore")
             held = read_mat(str(path))
-    except DriveError:
-        raise
-    except OSError as e:
-        if e.errno is not None and e.filename is not None:
-            raise
-        raise _damaged(path, e) from None
-    # The libraries' errors on damaged files are of many kinds, down to MemoryError.
-    except Exception as e:
-        raise _damaged(path, e) from None
     found = recording_of(path, _tree(held, 0), time)
     if not found.channels:
         found.notes.append(Problem.of("file.matlab_objects"))
@@ -109,13 +98,6 @@ def _check_deflated(path: Path) -> None:
                     return
                 check_unpacked(path, size)
             file.seek(after)
-
-
-def _damaged(path: Path, error: Exception) -> DriveError:
-    reason = first_line(error) or type(error).__name__
-    return DriveError(
-        f"{path} is not a readable MATLAB file ({reason}); it may have been cut off: copy it again"
-    )
 
 
 def _tree(group: Mapping[str, Any], depth: int) -> Tree:

@@ -21,12 +21,13 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from weighbridge.errors import DriveError, MissingExtraError
+from weighbridge.errors import DriveError
 from weighbridge.io.channels import Channel, Recording, draft_of, log_of
 from weighbridge.io.draft import Draft
 from weighbridge.io.frames import EXTENDED_MASK, Frames, in_order
 from weighbridge.io.info import MDF_INFO_MARK, parse_info
 from weighbridge.io.labels import physical_of
+from weighbridge.io.libraries import importing, reason_of, unreadable
 from weighbridge.io.log import Log
 from weighbridge.io.mapping import TableMapping, UnnamedError
 from weighbridge.io.mdf_repair import Repaired, corrected, guard, settle
@@ -111,14 +112,12 @@ def draft(path: Path) -> Draft:
 @contextmanager
 def _file(path: Path) -> Iterator[tuple[Any, str]]:
     """Open an MDF file, and say what is left of one that is damaged; empty of a whole one."""
-    try:
+    with importing("asammdf", "mdf", f"reading {path.name}"):
         from asammdf import MDF
-    except ImportError:
-        raise MissingExtraError("asammdf", "mdf", f"reading {path.name}") from None
     try:
         saved = corrected(path)
     except ValueError as e:
-        raise _unreadable(path, str(e)) from None
+        raise unreadable(path, "MDF file", str(e)) from None
     with (
         warnings.catch_warnings(),
         # Of an unfinished file the library makes a copy, which it leaves behind if that fails.
@@ -172,18 +171,12 @@ def _open(opener: Any, path: Path, saved: Repaired | None, folder: str) -> tuple
             return file, settle(file)
     # The library's errors are of many kinds, down to struct.error.
     except Exception as e:
-        reason = _first_line(e)
+        reason = reason_of(e)
     finally:
         if reason:
             gc.collect()
         sys.unraisablehook = hook
-    raise _unreadable(path, reason)
-
-
-def _unreadable(path: Path, reason: str) -> DriveError:
-    return DriveError(
-        f"{path} is not a readable MDF file ({reason}); it may have been cut off: copy it again"
-    )
+    raise unreadable(path, "MDF file", reason)
 
 
 def _start(file: Any) -> float | None:
@@ -201,10 +194,22 @@ def _info(file: Any, path: Path) -> DriveInfo | None:
     return parse_info(text, path.name) if text.startswith(MDF_INFO_MARK) else None
 
 
+@contextmanager
+def _reading(path: Path, what: str) -> Iterator[None]:
+    try:
+        yield
+    # The library's errors on damaged data are of many kinds.
+    except Exception as e:
+        raise DriveError(
+            f"{path}: {what} cannot be read ({reason_of(e)}); the file may have been cut off: "
+            "copy it again"
+        ) from None
+
+
 def _bus_frames(file: Any, path: Path) -> Frames:
     """All CAN data frames of a file, in the order of time since its start."""
     parts = []
-    try:
+    with _reading(path, "its bus frames"):
         for g, group in enumerate(file.groups):
             if not group.channel_group.cycles_nr:
                 continue
@@ -215,12 +220,6 @@ def _bus_frames(file: Any, path: Path) -> Frames:
                     if found.samples.dtype.names:
                         parts.append(_frames(found.timestamps, found.samples))
                     break
-    # The library's errors on damaged data are of many kinds.
-    except Exception as e:
-        raise DriveError(
-            f"{path}: its bus frames cannot be read ({_first_line(e)}); "
-            "the file may have been cut off: copy it again"
-        ) from None
     several = len(parts) > 1
     joined = in_order(parts)
     return joined.select(np.argsort(joined.time, kind="stable")) if several else joined
@@ -291,7 +290,12 @@ def _loaded(
     if values is None:
         values = np.empty(0)
     elif channel.conversion is not None and (none := int(np.count_nonzero(np.isnan(values)))):
-        about: dict[str, Any] = {"file": path.name, "count": none, "values": values.size, "name": channel.name}
+        about: dict[str, Any] = {
+            "file": path.name,
+            "count": none,
+            "values": values.size,
+            "name": channel.name,
+        }
         odd.append(Problem.of("file.sentinels", quantity, **about))
     return Channel(channel.name, clocks.setdefault(place[0], time), values, unit), odd
 
@@ -305,17 +309,11 @@ def _unit_text(channel: Any) -> str:
 
 def _samples(file: Any, path: Path, place: _Place) -> tuple[Floats, Floats | None]:
     """Time and physical values of one channel, samples marked invalid left out as NaN."""
-    group = file.groups[place[0]]
-    try:
-        # asammdf does not come back from packed data of which no record is to be read.
-        if not group.channel_group.cycles_nr:
-            return np.empty(0), np.empty(0)
+    # asammdf does not come back from packed data of which no record is to be read.
+    if not file.groups[place[0]].channel_group.cycles_nr:
+        return np.empty(0), np.empty(0)
+    with _reading(path, f"channel group {place[0]}"):
         found = file.get(group=place[0], index=place[1], ignore_invalidation_bits=True)
-    except Exception as e:
-        raise DriveError(
-            f"{path}: channel group {place[0]} cannot be read ({_first_line(e)}); "
-            "the file may have been cut off: copy it again"
-        ) from None
     time = np.array(found.timestamps, dtype=np.float64)
     if found.samples.ndim != 1:
         return time, None
@@ -338,8 +336,3 @@ def _labelled(file: Any, place: _Place, texts: np.ndarray) -> Floats | None:
     if raw.ndim != 1 or raw.dtype.kind not in "biuf" or raw.size != texts.size:
         return None
     return physical_of(raw.astype(np.float64), texts)[0]
-
-
-def _first_line(error: Exception) -> str:
-    text = str(error).strip().split("\n", 1)[0]
-    return text or type(error).__name__

@@ -23,10 +23,10 @@ from typing import Any, Final, TypeAlias
 
 import numpy as np
 
-from weighbridge.errors import DriveError, MissingExtraError
+from weighbridge.errors import DriveError
 from weighbridge.io.channels import Channel, Recording, check_unpacked, most_unpacked
+from weighbridge.io.libraries import importing, reason_of
 from weighbridge.io.mapping import TimeColumn
-from weighbridge.io.quiet import first_line
 from weighbridge.io.table import column_list, since_1970
 from weighbridge.messages import Problem
 from weighbridge.signals import Floats
@@ -114,12 +114,9 @@ def open_mcap(path: Path, time: TimeColumn) -> Recording:
     MissingExtraError
         mcap or rosbags is not installed.
     """
-    try:
+    with importing("", "ros", f"reading {path.name}"):
         import rosbags.typesys  # noqa: F401  (what decodes the messages)
         from mcap import records
-    except ImportError as e:
-        raise MissingExtraError(e.name or "mcap", "ros", f"reading {path.name}") from None
-
     check_unpacked(path, _promised(path))
 
     def messages() -> Iterator[_Message]:
@@ -202,12 +199,10 @@ def open_bag(path: Path, time: TimeColumn) -> Recording:
     MissingExtraError
         rosbags is not installed.
     """
-    try:
+    with importing("", "ros", f"reading {path.name}"):
         from rosbags.interfaces import MessageDefinitionFormat
         from rosbags.rosbag1 import Reader as Reader1
         from rosbags.rosbag2 import Reader as Reader2
-    except ImportError as e:
-        raise MissingExtraError(e.name or "rosbags", "ros", f"reading {path.name}") from None
     one = path.suffix.lower() == ".bag"
 
     def messages() -> Iterator[_Message]:
@@ -257,7 +252,7 @@ def _recording(
         raise
     # So do the libraries on damaged files.
     except Exception as e:
-        reason = first_line(e) or type(e).__name__
+        reason = reason_of(e)
     held = [t for t in topics.values() if t is not None and t.logged]
     if not held:
         why = f" ({reason})" if reason else ""

@@ -16,7 +16,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from weighbridge.errors import DriveError, MissingExtraError
+from weighbridge.errors import DriveError
+from weighbridge.io.libraries import importing
 from weighbridge.io.log import Log
 from weighbridge.io.mapping import TableMapping
 from weighbridge.io.table import unwrapped
@@ -91,7 +92,8 @@ def read_sentence(text: str) -> Sentence:
     MissingExtraError
         pynmea2 is not installed.
     """
-    pynmea2 = _parser("reading NMEA sentences")
+    with importing("pynmea2", "position", "reading NMEA sentences"):
+        import pynmea2
     try:
         return _read(pynmea2.parse(text))
     except UnfitSentenceError:
@@ -101,14 +103,6 @@ def read_sentence(text: str) -> Sentence:
     # The parser leaves damage in a field to whoever asks for it, with errors of many kinds.
     except Exception:
         raise UnfitSentenceError("damaged") from None
-
-
-def _parser(purpose: str) -> Any:
-    try:
-        import pynmea2
-    except ImportError:
-        raise MissingExtraError("pynmea2", "position", purpose) from None
-    return pynmea2
 
 
 def _read(message: Any) -> Sentence:
@@ -159,7 +153,8 @@ def read_nmea(path: Path, table: str | None, mapping: TableMapping | None) -> Lo
     MissingExtraError
         pynmea2 is not installed.
     """
-    _parser(f"reading {path.name}")
+    with importing("pynmea2", "position", f"reading {path.name}"):
+        import pynmea2  # noqa: F401
     data = path.read_bytes()
     log = Log(path)
     position = _Rows(("latitude", "longitude", "altitude", "hdop"))

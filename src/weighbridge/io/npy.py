@@ -21,6 +21,7 @@ from pathlib import Path
 import numpy as np
 
 from weighbridge.errors import ConfigError, DriveError
+from weighbridge.io.libraries import parsing
 from weighbridge.io.log import Log
 from weighbridge.io.mapping import TableMapping, resolved_unit
 from weighbridge.signals import Floats
@@ -84,18 +85,10 @@ def read_npy(path: Path, table: str | None, mapping: TableMapping | None) -> Log
 def _load(path: Path) -> Floats:
     if not path.is_file():
         raise DriveError(f"{path}: no such file")
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            # Mapped, a header that promises more than the file holds cannot fill the memory.
-            array = np.load(path, mmap_mode="r", allow_pickle=False)
-    # A damaged header goes through Python's own parser, whose errors are of many kinds.
-    except Exception as e:
-        text = (str(e).strip().splitlines() or [type(e).__name__])[0]
-        raise DriveError(
-            f"{path} is not a readable NumPy array ({text[:120]}); it may have been cut off: "
-            "copy it again"
-        ) from None
+    with parsing(path, "NumPy array"), warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        # Mapped, a header that promises more than the file holds cannot fill the memory.
+        array = np.load(path, mmap_mode="r", allow_pickle=False)
     if not isinstance(array, np.ndarray) or array.dtype.kind not in "biuf":
         raise DriveError(f"{path} holds {getattr(array, 'dtype', 'several arrays')}, not numbers")
     return np.array(array, dtype=np.float64)

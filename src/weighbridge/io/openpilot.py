@@ -18,9 +18,10 @@ from typing import Any, Final
 
 import numpy as np
 
-from weighbridge.errors import DriveError, MissingExtraError
+from weighbridge.errors import DriveError
 from weighbridge.io.channels import Channel, Recording
 from weighbridge.io.frames import EXTENDED_MASK, Frames
+from weighbridge.io.libraries import importing
 from weighbridge.io.mapping import TimeColumn
 from weighbridge.io.quiet import first_line
 from weighbridge.messages import Problem
@@ -114,10 +115,8 @@ def open_openpilot(path: Path, time: TimeColumn) -> Recording:
     MissingExtraError
         pycapnp, or for a ``.zst`` zstandard, is not installed.
     """
-    try:
+    with importing("pycapnp", "openpilot", f"reading {path.name}"):
         event = _schema().Event
-    except ImportError:
-        raise MissingExtraError("pycapnp", "openpilot", f"reading {path.name}") from None
     data, reason = _unpacked(path)
     held = _Held()
     count = strange = 0
@@ -151,10 +150,8 @@ def _unpacked(path: Path) -> tuple[bytes, str]:
     data = path.read_bytes()
     reason = ""
     if data.startswith(_ZSTANDARD):
-        try:
+        with importing("zstandard", "openpilot", f"reading {path.name}"):
             import zstandard
-        except ImportError:
-            raise MissingExtraError("zstandard", "openpilot", f"reading {path.name}") from None
         data, reason = _decompressed(path, data, zstandard.ZstdDecompressor().decompressobj)
     elif data.startswith(_BZIP2):
         data, reason = _decompressed(path, data, bz2.BZ2Decompressor)

@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from weighbridge.errors import DriveError, MissingExtraError
+from weighbridge.errors import DriveError
 from weighbridge.io.channels import Recording
+from weighbridge.io.libraries import importing, parsing
 from weighbridge.io.mapping import TimeColumn
-from weighbridge.io.quiet import first_line
 from weighbridge.io.trees import Leaf, recording_of
 from weighbridge.signals import Floats
 
@@ -31,32 +31,21 @@ def open_tdms(path: Path, time: TimeColumn) -> Recording:
     MissingExtraError
         npTDMS is not installed.
     """
-    try:
+    with importing("npTDMS", "tdms", f"reading {path.name}"):
         from nptdms import TdmsFile
         from nptdms.log import log_manager
-    except ImportError:
-        raise MissingExtraError("npTDMS", "tdms", f"reading {path.name}") from None
     log_manager.set_level(logging.CRITICAL)
     starts: set[bool] = set()
     clocks: dict[tuple[float, float, int], Floats] = {}
     tree: dict[str, Any] = {}
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            file = TdmsFile.read(path)
-            for group in file.groups():
-                here = tree.setdefault(group.name, {})
-                for channel in group.channels():
-                    leaf, dated = _leaf(channel, time, clocks)
-                    here[channel.name] = leaf
-                    starts |= {dated} if leaf.time is not None else set()
-    # The library's errors on damaged files are of many kinds, down to MemoryError.
-    except Exception as e:
-        reason = first_line(e) or type(e).__name__
-        raise DriveError(
-            f"{path} is not a readable TDMS file ({reason}); it may have been cut off: copy it "
-            "again"
-        ) from None
+    with parsing(path, "TDMS file"), warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        for group in TdmsFile.read(path).groups():
+            here = tree.setdefault(group.name, {})
+            for channel in group.channels():
+                leaf, dated = _leaf(channel, time, clocks)
+                here[channel.name] = leaf
+                starts |= {dated} if leaf.time is not None else set()
     if starts == {True, False}:
         raise DriveError(
             f"{path}: some of its waveforms have a start time and others none; name the time of "
