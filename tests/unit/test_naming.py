@@ -24,7 +24,7 @@ LEAST_RIGHT = 0.95
 
 LEAST_OTHER_LANGUAGES = 0.8
 """Part of the columns of lists that were looked for after the last word was added: 0.37 before,
-0.82 with the words of `languages.py`."""
+0.82 with the words of `names.ini`."""
 
 LEAST_HELD_OUT = 0.9
 """Part of those columns that nothing was made for: 0.88 before shortened words were spelled out,

@@ -6,78 +6,13 @@ import difflib
 import re
 from typing import Final
 
+from weighbridge.io.vocabulary import SPELLED_UNITS, UNIT_TEXTS
 from weighbridge.signals import QUANTITIES, Quantity
 from weighbridge.signals.catalogue import TIME_COLUMN
 from weighbridge.signals.units import UNITS
 
-UNIT_TEXTS: Final[dict[str, str]] = {
-    "km/h": "kmh", "kph": "kmh", "km/hr": "kmh", "kmph": "kmh", "mi/h": "mph", "m/s": "mps",
-    "meters/second": "mps", "knots": "kn",
-    "m/s^2": "mps2", "m/s²": "mps2", "m/s2": "mps2", "m/s/s": "mps2", "ms2": "mps2",
-    "m/s**2": "mps2", "ms-2": "mps2", "ms^-2": "mps2", "gn": "g",
-    "1/min": "rpm", "/min": "rpm", "rev/min": "rpm", "r/min": "rpm", "min-1": "rpm",
-    "min^-1": "rpm",
-    "rad/s": "radps", "deg/s": "degps", "°/s": "degps", "dps": "degps",
-    "°": "deg", "degrees": "deg", "radians": "rad", "semicircles": "semicircle",
-    **dict.fromkeys(("e7", "deg e7", "1e-7 deg", "1e-7 degrees", "deg*1e7", "deg * 1e7",
-                     "1e-7°", "10^-7 deg", "degrees e7"), "dege7"),
-    "lb-ft": "lbft", "lb ft": "lbft", "lb·ft": "lbft", "lbf-ft": "lbft", "lbf·ft": "lbft",
-    "lbf ft": "lbft", "lbfft": "lbft", "ft-lb": "lbft", "ft lb": "lbft", "ft-lbs": "lbft",
-    "ft·lb": "lbft", "ft-lbf": "lbft", "ft·lbf": "lbft", "ftlb": "lbft", "lbs-ft": "lbft",
-    "mdps": "mdegps", "mdeg/s": "mdegps", "m°/s": "mdegps",
-    "nm": "nm", "n m": "nm", "n·m": "nm", "n.m": "nm", "n*m": "nm",
-    "%": "pct", "percent": "pct", "prozent": "pct", "proz": "pct", "-": "ratio", "1": "ratio",
-    "°c": "degc", "℃": "degc", "c": "degc", "deg c": "degc", "celsius": "degc",
-    "degree celsius": "degc",
-    "°f": "degf", "℉": "degf", "f": "degf", "â°c": "degc", "â°": "deg",
-    "g/s": "gps", "g/sec": "gps", "kg/s": "kgps",
-    "l/h": "lph", "l/hr": "lph", "volt": "v", "volts": "v", "kilopascal": "kpa", "u/min": "rpm",
-    "tr/min": "rpm", "tours/min": "rpm", "giri/min": "rpm", "r.p.m.": "rpm", "min⁻¹": "rpm",
-    "omw/min": "rpm", "toeren/min": "rpm", "varv/min": "rpm", "obr/min": "rpm", "obr./min": "rpm",
-    "ot/min": "rpm", "ot./min": "rpm", "dev/dk": "rpm", "d/dk": "rpm", "dev/dak": "rpm",
-    "kg/h": "kgph", "kg/hr": "kgph", "lb/min": "lbpmin", "lbs/min": "lbpmin", "msec": "ms",
-    "unit_minutinver": "rpm", "unit_kilometerperhour": "kmh", "unit_percent": "pct",
-    "unit_newtometer": "nm", "unit_degrecelsi": "degc", "unit_volt": "v", "unit_amper": "a",
-    "unit_meterperseconsquar": "mps2", "unit_degreofarc": "deg", "unit_secon": "s",
-    "unit_kilogram": "kg", "kilogram": "kg", "kilograms": "kg",
-    "sec": "s", "seconds": "s", "µs": "us", "μs": "us",
-    **dict.fromkeys(("km/std", "km/u", "km/uur", "km/t", "km/tim", "km/sa", "km/saat", "km/hod",
-                     "km/godz", "km/ora"), "kmh"),
-    "км/ч": "kmh", "км/час": "kmh", "公里/小时": "kmh", "公里/时": "kmh", "千米/时": "kmh",
-    "м/с": "mps", "м/с²": "mps2",
-    "об/мин": "rpm", "об./мин": "rpm", "мин-1": "rpm", "转/分": "rpm", "转/分钟": "rpm",
-    "回転/分": "rpm", "tpm": "rpm",
-    "t/min": "rpm", "tr/mn": "rpm", "trs/min": "rpm", "rot/min": "rpm", "нм": "nm",
-    "н·м": "nm", "牛米": "nm", "牛·米": "nm",
-    "г/с": "gps", "кг/ч": "kgph", "л/ч": "lph", "кпа": "kpa", "бар": "bar", "кг": "kg",
-    "квт": "kw", "вт": "w",
-    "сек": "s", "с": "s", "мс": "ms", "秒": "s", "毫秒": "ms", "초": "s", "в": "v", "伏": "v",
-    "安": "a",
-    "град": "deg", "град.": "deg", "度": "deg", "м": "m", "米": "m", "per": "pct", "gm/s": "gps",
-    "gm/sec": "gps",
-}  # fmt: skip
-"""Units as people and loggers write them, and the suffix each means."""
-
 _TIMES: Final = re.compile(r"\s*[*•⋅∙x×]\s*")
 """Signs of a product."""
-
-_SPELLED: Final = {
-    "per": "/", "squared": "2",
-    **dict.fromkeys(("meter", "meters", "metre", "metres"), "m"),
-    **dict.fromkeys(("kilometer", "kilometers", "kilometre", "kilometres"), "km"),
-    **dict.fromkeys(("mile", "miles"), "mi"),
-    **dict.fromkeys(("second", "seconds", "sec"), "s"),
-    **dict.fromkeys(("hour", "hours", "hr"), "h"),
-    **dict.fromkeys(("minute", "minutes"), "min"),
-    **dict.fromkeys(("degree", "degrees"), "deg"),
-    **dict.fromkeys(("radian", "radians"), "rad"),
-    **dict.fromkeys(("revolution", "revolutions", "revs"), "rev"),
-    **dict.fromkeys(("gram", "grams"), "g"),
-    **dict.fromkeys(("kilogram", "kilograms"), "kg"),
-    **dict.fromkeys(("pound", "pounds", "lbs"), "lb"),
-    **dict.fromkeys(("liter", "liters", "litre", "litres"), "l"),
-}  # fmt: skip
-"""Words of units that are spelled out."""
 
 UNKNOWN_UNIT: Final = "?"
 """Stands before a unit that a log states and nobody knows: no quantity is in it."""
@@ -117,7 +52,7 @@ def unit_suffix(text: str) -> str | None:
     word = " ".join(word.replace("_", " ").split())
     found = found or UNIT_TEXTS.get(word) or UNIT_TEXTS.get(_TIMES.sub("·", word))
     if found is None and " per " in word:
-        short = "".join(_SPELLED.get(part, part) for part in word.split())
+        short = "".join(SPELLED_UNITS.get(part, part) for part in word.split())
         return short if short in UNITS else UNIT_TEXTS.get(short)
     return found
 

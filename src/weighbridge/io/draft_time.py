@@ -12,8 +12,8 @@ import polars as pl
 
 from weighbridge.errors import DriveError
 from weighbridge.io.naming import is_time, unit_of, words_of
-from weighbridge.io.phrases import TIME_WORDS
 from weighbridge.io.table import RawTable, column_list, since_1970, time_seconds
+from weighbridge.io.vocabulary import TIME_WORDS
 from weighbridge.messages import Problem
 from weighbridge.signals import Floats
 from weighbridge.signals.units import UNITS

@@ -14,54 +14,20 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Final
 
-from weighbridge.io.abbreviations import LONG, OF_ANOTHER, SOURCES, spelled
 from weighbridge.io.columns import UNKNOWN_UNIT, dimension_of, unit_refused, unit_suffix
-from weighbridge.io.languages import LANGUAGES, TIMES
-from weighbridge.io.phrases import AGAINST, BARE, PHRASES, TIME_PHRASES
+from weighbridge.io.vocabulary import (
+    AGAINST,
+    ASPECTS,
+    BARE,
+    LONG,
+    OF_ANOTHER,
+    PHRASES,
+    SILENT,
+    TIME_PHRASES,
+    spelled,
+)
 from weighbridge.signals import QUANTITIES
 from weighbridge.signals.units import UNITS
-
-_NOISE: Final = frozenset(
-    ("obd", "ii", "obd2", "obdii", "pid", "sensor", "sensors", "value", "raw", "rohwert", "data",
-     "signal", "1", "01", "by", "wire", "drive", "bank", "of", "the", "in", "can", "ecu",
-     "location", "main", "txt", "ext", "extended", "rng", "wgs", "der", "des", "du", "de", "la",
-     "le", "el", "del", "della", "di", "do", "da", "from", "as")
-)  # fmt: skip
-"""Words that say nothing of the quantity; the first of a kind is the one that others have alone."""
-
-_ASPECTS: Final = {
-    **dict.fromkeys(
-        ("throttle", "relative_throttle", "commanded_throttle", "accelerator_pedal",
-         "relative_pedal"),
-        frozenset(("position", "angle", "opening", "plate", "valve", "body", "servo", "percent",
-                   "percentage", "engine")),
-    ),
-    "gear": frozenset(("position", "engine")),
-    "vehicle_speed": frozenset(
-        ("tachograph", "tacho", "tacografo", "tachographe", "tachografu", "仪表", "odom",
-         "odometry")
-    ),
-    **dict.fromkeys(
-        ("latitude", "longitude", "altitude", "gnss_course", "gnss_accuracy", "hdop"),
-        frozenset(("gps", "position", "receiver", "satellite", "dd", "degrees", "decimal")),
-    ),
-    **dict.fromkeys(
-        ("brake_switch", "clutch_switch"),
-        frozenset(("switch", "signal", "contacteur", "interrupteur", "interruttore", "interruptor",
-                   "schalter", "schakelaar", "service", "servicio", "servizio", "roboczy")),
-    ),
-    **dict.fromkeys(
-        ("battery_voltage", "battery_current"),
-        frozenset(("sum", "total", "summe", "gesamt")),
-    ),
-    **dict.fromkeys(
-        ("engine_torque", "engine_torque_fraction"),
-        frozenset(("at", "clutch", "crank", "crankshaft", "flywheel", "net", "sum", "total",
-                   "summe", "净", "输出", "effective", "effectif", "effektiv")),
-    ),
-}  # fmt: skip
-"""Words that show how a quantity is measured, or where: with one of them, several or none it is the
-same."""
 
 _BARE: Final = frozenset(
     ("current", "voltage", "speed", "torque", "power", "temperature", "pressure", "position",
@@ -99,8 +65,6 @@ def _plain(text: str) -> str:
 def _phrases(quantity: str) -> tuple[str, ...]:
     """What loggers call a quantity in any language; its own name where nobody has one for it."""
     found = list(PHRASES.get(quantity, (quantity.replace("_", " "),)))
-    for reported in LANGUAGES.values():
-        found += reported.get(quantity, ())
     if quantity == "engine_torque_fraction":
         # Its unit distinguishes it.
         found += _phrases("engine_torque")
@@ -136,9 +100,7 @@ _NOT: Final = {
     q: frozenset(spelled(words)) | frozenset(map(_plain, words)) for q, words in AGAINST.items()
 }
 
-_TIMES: Final = TIME_PHRASES | frozenset(map(_plain, TIMES))
-
-_SILENT: Final = _NOISE | SOURCES
+_TIMES: Final = frozenset(map(_plain, TIME_PHRASES))
 
 _SHORTEST: Final = 3
 """Letters of a word at least that is in another one."""
@@ -156,8 +118,8 @@ _VOCABULARY: Final = frozenset(
         *(time.split() for time in _TIMES),
         *AGAINST.values(),
         OF_ANOTHER,
-        _SILENT,
-        *_ASPECTS.values(),
+        SILENT,
+        *ASPECTS.values(),
         LONG,
     )
     for word in map(_plain, words)
@@ -172,9 +134,9 @@ _BRAKES: Final = (
 """Beginnings of words that have to do with brakes."""
 
 _BARE_NAMES: Final = {
-    _plain(word): [q for q, others in BARE.items() if word in others.split()]
+    _plain(word): [q for q, others in BARE.items() if word in others]
     for words in BARE.values()
-    for word in words.split()
+    for word in words
 }
 
 _ENGINE: Final = frozenset(
@@ -233,7 +195,7 @@ _WANTED_TOO: Final = frozenset(("engine_torque", "engine_torque_fraction", "gear
 """Quantities of which a log often has what is measured and what is wanted."""
 
 _OF_VEHICLE: Final = (
-    frozenset(("obd", "vehicle", "car", "wheel", "can", "ecu")) | _ASPECTS["vehicle_speed"]
+    frozenset(("obd", "vehicle", "car", "wheel", "can", "ecu")) | ASPECTS["vehicle_speed"]
 )
 """Words by which a speed is not that of satellites."""
 
@@ -437,7 +399,7 @@ def _recognised(name: str, words: tuple[str, ...], stated: str | None) -> Named:
             continue
         if stated is not None and not _can_be(quantity, stated):
             continue
-        aspects = _ASPECTS.get(quantity, frozenset())
+        aspects = ASPECTS.get(quantity, frozenset())
         near = {phrase for word in said_at_all for phrase in _WITH_WORD[quantity].get(word, ())}
         pairs = itertools.product(readings, near)
         score = max((_score(said, wanted, aspects) for said, wanted in pairs), default=0.0)
@@ -457,8 +419,8 @@ def bare_quantities(name: str) -> frozenset[str]:
     sensor's with gravity, and what has to do with brakes their switch.
     """
     last = [part for part in _PATH.split(_piped(name)) if part.strip()][-1:]
-    words = frozenset(spelled(unit_of(last[0])[1])) - _SILENT if last else frozenset()
-    words -= _ASPECTS["battery_voltage"]
+    words = frozenset(spelled(unit_of(last[0])[1])) - SILENT if last else frozenset()
+    words -= ASPECTS["battery_voltage"]
     words = frozenset(w for w in words if len(w) > 1) or words
     if len(words) == 1 and (found := _BARE_NAMES.get(next(iter(words)))):
         return frozenset(found)
@@ -503,7 +465,7 @@ def _last_places(name: str) -> set[frozenset[str]]:
     """Words of the last parts of a name that is a path, where they alone name something."""
     parts = [part for part in _PATH.split(_piped(name)) if part.strip()]
     ends = [frozenset(spelled(words_of(" ".join(parts[-k:])))) for k in range(1, len(parts))]
-    return {words for words in ends if any(len(w) > 1 for w in words - _SILENT - _BARE)}
+    return {words for words in ends if any(len(w) > 1 for w in words - SILENT - _BARE)}
 
 
 def _score(words: frozenset[str], phrase: frozenset[str], aspects: frozenset[str]) -> float:
@@ -517,9 +479,9 @@ def _score(words: frozenset[str], phrase: frozenset[str], aspects: frozenset[str
     """
     if (words - phrase) & OF_ANOTHER:
         return 0.0
-    silent = _SILENT | aspects
-    core = phrase - silent or phrase - _SILENT or phrase
-    said = words - silent or words - _SILENT or words
+    silent = SILENT | aspects
+    core = phrase - silent or phrase - SILENT or phrase
+    said = words - silent or words - SILENT or words
     # What is left of "current in" would name any current.
     needed = phrase if core <= _BARE else core
     if not (needed <= words and core <= said):
@@ -629,7 +591,7 @@ def _misfit(name: str, stated: str | None, taken: set[str]) -> str:
     """Say that a name would be a quantity's that is not taken, but for the unit it states."""
     for base, text in _without_unit(_piped(name), stated):
         quantity = _recognised(base, words_of(base), None)
-        of_another = OF_ANOTHER | _SILENT | _NOT.get(quantity.quantity, frozenset())
+        of_another = OF_ANOTHER | SILENT | _NOT.get(quantity.quantity, frozenset())
         if quantity.score < 1.0 or quantity.quantity in taken or of_another & set(words_of(text)):
             continue
         if QUANTITIES[quantity.quantity].suffix:
@@ -653,7 +615,7 @@ def _axes_by_direction(names: Sequence[str], found: list[Named]) -> list[Named]:
         return found
     axes: dict[str, int] = {}
     for k, (name, named) in enumerate(zip(names, found, strict=True)):
-        said = frozenset(spelled(unit_of(name)[1])) - _SILENT
+        said = frozenset(spelled(unit_of(name)[1])) - SILENT
         for quantity, spellings in _DIRECTIONS.items():
             if said in spellings and (named.unit is None or _can_be(quantity, named.unit)):
                 axes.setdefault(quantity, k)
