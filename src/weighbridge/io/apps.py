@@ -34,8 +34,9 @@ from weighbridge.errors import DriveError
 from weighbridge.io.columns import bracketed_unit, dimension_of, unit_suffix
 from weighbridge.io.log import Log
 from weighbridge.io.mapping import MappedSignal, TableMapping, TimeColumn
-from weighbridge.io.table import RawTable, TextFormat, column_list, plain_head, read_text
+from weighbridge.io.table import RawTable, TextFormat, column_list, read_text
 from weighbridge.io.tabular import read_mapped
+from weighbridge.io.understood import plain_head, text_of
 from weighbridge.signals import QUANTITIES, Floats, Problem
 from weighbridge.signals.cleaning import clean_columns
 from weighbridge.signals.units import UNITS, to_si
@@ -95,7 +96,7 @@ def read_racechrono(path: Path, table: str | None, mapping: TableMapping | None)
     DriveError
         Another version of the format, or none of its columns is known.
     """
-    lines = path.read_bytes().decode("utf-8", errors="replace").splitlines()
+    lines = text_of(path.read_bytes()).splitlines()
     version = next((x for line in lines[:20] if (x := re.match(r"Format,\"?(\d+)", line))), None)
     if version is not None and version.group(1) != "3":
         raise DriveError(

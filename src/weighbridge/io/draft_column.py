@@ -9,6 +9,7 @@ import numpy as np
 
 from weighbridge.constants import GRAVITY
 from weighbridge.io.naming import words_of
+from weighbridge.io.vocabulary import WORDS
 from weighbridge.signals import QUANTITIES
 from weighbridge.signals.signal import Bools, Floats
 from weighbridge.signals.units import UNITS
@@ -21,26 +22,14 @@ _SPEEDS: Final = {
     "gnss_speed": "the speed of satellites, not of the wheels (vehicle_speed)",
 }
 
-_TELLING: Final = frozenset(
-    ("obd", "vehicle", "veh", "car", "wheel", "ego", "gps", "gnss", "ground", "location", "sog")
-)
-"""Words by which a speed is known to be one of the two."""
-
-
 _NULL_ISLAND: Final = 0.01
 """Positions nearer to 0 are those of a receiver that has none [rad] or [deg]."""
-
-CALCULATED: Final = frozenset(
-    ("calc", "calculated", "derived", "computed", "derivative", "berechnet", "abgeleitet",
-     "calcule", "calculada", "calcolata")
-)  # fmt: skip
-"""Words of an acceleration that no accelerometer measured."""
 
 
 def is_calculated(name: str, quantity: str) -> bool:
     """Whether a name says of an acceleration that it was calculated."""
     accel = quantity == "longitudinal_accel" or quantity.startswith("accel_")
-    return accel and bool(CALCULATED & set(words_of(name)))
+    return accel and bool(WORDS["calculated"] & set(words_of(name)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,7 +128,7 @@ def speed_checked(columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, ...]:
     if not {"obd", "gnss"} <= tables:
         return columns
     speeds = [c for c in columns if c.quantity in _SPEEDS]
-    if len(speeds) != 1 or _TELLING & set(words_of(speeds[0].name)):
+    if len(speeds) != 1 or WORDS["of_a_speed"] & set(words_of(speeds[0].name)):
         return columns
     question = f"taken for {_SPEEDS[speeds[0].quantity]}; its name does not say which"
     return tuple(

@@ -13,7 +13,8 @@ from weighbridge.errors import DriveError
 from weighbridge.io.columns import UNKNOWN_UNIT, stated_unit, unit_suffix
 from weighbridge.io.draft_time import is_clock, is_number
 from weighbridge.io.naming import is_time, recognise
-from weighbridge.io.table import SEPARATORS, TextFormat, cells, head
+from weighbridge.io.table import SEPARATORS, TextFormat, head
+from weighbridge.io.understood import cells
 
 HEAD_LINES: Final = 60
 """Lines at the beginning that show how a text is written."""

@@ -13,7 +13,7 @@ import polars as pl
 from weighbridge.errors import DriveError
 from weighbridge.io.naming import is_time, unit_of, words_of
 from weighbridge.io.table import RawTable, column_list, since_1970, time_seconds
-from weighbridge.io.vocabulary import TIME_WORDS
+from weighbridge.io.vocabulary import COUNTERS, TIME_WORDS
 from weighbridge.messages import Problem
 from weighbridge.signals import Floats
 from weighbridge.signals.units import UNITS
@@ -46,14 +46,6 @@ _ISO: Final = re.compile(r"\d{4}-\d{2}-\d{2}[T ]\d{2}:\d{2}:\d{2}")
 
 _USUAL_STEP: Final = (1e-3, 20.0)
 """Time between rows of loggers [s]."""
-
-_COUNTERS: Final = frozenset(
-    ("", "index", "idx", "row", "row number", "row no", "sample", "sample number", "sample no", "n",
-     "no", "nr", "number", "count", "counter", "sample count", "sample counter", "frame", "line",
-     "frame number", "frame id", "record", "record number", "seq", "sequence", "packet", "zeile",
-     "sequence number", "packet number", "unnamed 0", "messwert nr", "ligne", "fila", "riga")
-)  # fmt: skip
-"""What loggers call a number that counts their rows, as `words_of` cuts it."""
 
 _STATED_RATE: Final = re.compile(
     r"\b(?:sampl\w*|logging|log|recording|data|abtast)[ _-]*(?:rate|freq\w*|frequenz)"
@@ -255,7 +247,7 @@ def _counted(raw: RawTable, rate: float) -> DraftTime:
     raw : the table
     rate : rows per second [Hz]; NaN where it is not known
     """
-    named = (k for k, n in enumerate(raw.names) if " ".join(words_of(n)) in _COUNTERS)
+    named = (k for k, n in enumerate(raw.names) if " ".join(words_of(n)) in COUNTERS)
     index = next((k for k in named if _counts(raw, k)), -1)
     name = raw.names[index] if index >= 0 else ""
     rows = raw.numbers(index)[0] if index >= 0 else np.arange(raw.rows, dtype=np.float64)

@@ -8,11 +8,12 @@ from pathlib import Path
 from typing import Final
 
 from weighbridge.io.draft import Draft
-from weighbridge.io.draft_column import CALCULATED, DraftColumn, gyro_checked
+from weighbridge.io.draft_column import DraftColumn, gyro_checked
 from weighbridge.io.draft_unit import NEAR, SLOWEST, SPEEDS
 from weighbridge.io.file_patterns import file_patterns, undated
 from weighbridge.io.naming import words_of
 from weighbridge.io.table import column_list
+from weighbridge.io.vocabulary import WORDS, words_in
 from weighbridge.signals.units import UNITS
 
 
@@ -162,36 +163,14 @@ def _meant(speed: DraftColumn, ground: DraftColumn) -> str | None:
     return None
 
 
-_LOOKS: Final[tuple[tuple[str, tuple[str, ...], frozenset[str]], ...]] = (
-    (
-        "the accelerometer",
-        ("accel_x", "accel_y", "accel_z", "longitudinal_accel"),
-        frozenset(
-            ("acc", "accel", "accl", "accelerometer", "acceleration", "acx", "acy", "acz", "gforce",
-             "beschleunigung", "aceleracion", "accelerazione", "versnelling", "przyspieszenie")
-        ),
-    ),
-    (
-        "the gyroscope",
-        ("gyro_x", "gyro_y", "gyro_z"),
-        frozenset(
-            ("gyr", "gyro", "gyroscope", "giroscopio", "drehrate", "rotation", "rot", "gyx", "gyy",
-             "gyz", "zyro")
-        ),
-    ),
-    (
-        "the engine speed",
-        ("engine_speed",),
-        frozenset(
-            ("rpm", "rev", "revs", "drehzahl", "motordrehzahl", "toerental", "giri", "obroty",
-             "otacky", "varvtal", "devir", "devri", "regime", "regimen", "ne", "nmot", "engspd",
-             "enginespeed", "enginerpm", "rotmoteur")
-        ),
-    ),
-)  # fmt: skip
-"""What a drive is weighed by, its quantities, and words that a column of it has in its name."""
+_SENSORS: Final = {
+    "accelerometer": ("accel_x", "accel_y", "accel_z", "longitudinal_accel"),
+    "gyroscope": ("gyro_x", "gyro_y", "gyro_z"),
+    "engine_speed": ("engine_speed",),
+}
+"""What a drive is weighed by, and its quantities."""
 
-_WITHOUT_GRAVITY: Final = frozenset(("linear", "user", "free", "liniowe")) | CALCULATED
+_WITHOUT_GRAVITY: Final = WORDS["without_gravity"] | WORDS["calculated"]
 """Words of an acceleration that has no gravity in it."""
 
 _SHOWN: Final = 4
@@ -208,14 +187,15 @@ def missing(drafts: Sequence[Draft]) -> Iterator[str]:
     known = {c.quantity for one in drafts for c in one.known}
     known |= frozenset().union(*(one.read_anyway for one in drafts))
     left = [(one, c.name) for one in drafts for c in one.columns if not c.quantity]
-    for what, quantities, words in _LOOKS:
+    for sensor, words in words_in("sensors").items():
+        quantities = _SENSORS[sensor]
         if known & set(quantities):
             continue
-        alike = [(one, name) for one, name in left if words & set(words_of(name))]
+        alike = [(one, name) for one, name in left if set(words) & set(words_of(name))]
         if not alike:
             continue
         names = column_list(dict.fromkeys(name for _, name in alike), _SHOWN)
-        of = f"no column of {alike[0][0].path.name} was taken for {what}"
+        of = f"no column of {alike[0][0].path.name} was taken for the {sensor.replace('_', ' ')}"
         if all(_WITHOUT_GRAVITY & set(words_of(name)) for _, name in alike):
             yield f"{of}: {names} have no gravity in them; record the raw accelerometer"
             continue

@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from datetime import datetime
 from functools import partial
@@ -22,12 +23,14 @@ import numpy as np
 import polars as pl
 
 from weighbridge.errors import DriveError
+from weighbridge.io.draft_text import HEAD_LINES
 from weighbridge.io.draft_time import is_clock, is_number, text_time_format
 from weighbridge.io.frames import Frames, in_order
 from weighbridge.io.log import Log, Reader
 from weighbridge.io.mapping import TableMapping
-from weighbridge.io.table import SEPARATORS, cells, plain_head, unwrapped
-from weighbridge.io.understood import Lines
+from weighbridge.io.table import SEPARATORS, parsed_dates, seconds_of, unwrapped
+from weighbridge.io.understood import Lines, cells, plain_head
+from weighbridge.io.vocabulary import words_in
 from weighbridge.kernels.frame_text import (
     ALONE,
     BASE64,
@@ -55,7 +58,6 @@ _EPOCH: Final = 1e8
 """Stamps above count from 1970, not from the start of the log [s]."""
 _FALLS: Final = 0.2
 """Part of the stamps that do not rise, from which they are times since the frame before [-]."""
-_HEAD_LINES: Final = 60
 
 _UNREADABLE: Final = "holds no CAN frame that can be read; record it again, or copy it again"
 
@@ -238,18 +240,19 @@ def _number(bus: str, taken: Mapping[str, int]) -> int:
 def _dates(stamps: Sequence[str], form: str) -> Floats:
     """Seconds since 1970, where no zone is shown by the clock of this computer; NaN of no date."""
     texts = pl.Series(stamps, dtype=pl.String)
-    universal = texts.str.ends_with("Z").any()
-    if form == "iso":
-        texts = texts.str.replace(" ", "T", literal=True).str.replace(r"Z$", "")
-        form = "%Y-%m-%dT%H:%M:%S%.f"
-    parsed = texts.str.to_datetime(form, strict=False, time_unit="us")
-    counts = parsed.cast(pl.Int64).cast(pl.Float64).fill_null(math.nan)
-    seconds = np.array(1e-6 * counts.to_numpy(), np.float64)
-    first = parsed.drop_nulls().head(1).to_list()
-    if universal or not first:
+    parsed = parsed_dates(texts, form)
+    seconds, _ = seconds_of(parsed)
+    first = parsed.drop_nulls().dt.replace_time_zone(None).head(1).to_list()
+    if texts.str.ends_with("Z").any() or not first:
         return seconds
     naive = (first[0] - datetime(1970, 1, 1)).total_seconds()
     return seconds + float(first[0].timestamp() - naive)
+
+
+def _begins(pattern: bytes) -> Callable[[bytes], bool]:
+    """Recognise a form by the first line of a text."""
+    mark = re.compile(pattern, re.IGNORECASE)
+    return lambda head: mark.match(head) is not None
 
 
 def _blocks(path: Path) -> Iterator[bytes]:
@@ -287,19 +290,7 @@ _ASC_MARK: Final = re.compile(
     re.IGNORECASE | re.MULTILINE,
 )
 """Lines of an ASC log that change how the lines after them are read."""
-_ASC_DATE: Final = re.compile(
-    r"(?P<month>[^\W\d]{3})\w*\s+(?P<day>\d{1,2})\s+(?P<hour>\d{1,2}):(?P<minute>\d{2}):"
-    r"(?P<second>\d{2})(?P<part>\.\d+)?(?:\s+(?P<half>[ap]m))?\s+(?P<year>\d{4})",
-    re.IGNORECASE,
-)
-_MONTHS: Final = {
-    name: k + 1
-    for names in (
-        "jan feb mar apr may jun jul aug sep oct nov dec",
-        "jan feb mär apr mai jun jul aug sep okt nov dez",
-    )
-    for k, name in enumerate(names.split())
-}
+_GERMAN: Final = {"mär": "mar", "mai": "may", "okt": "oct", "dez": "dec"}
 _WAYS: Final = "rx tx rxrq txrq"
 _ASC: Final = Form(
     shapes=(
@@ -334,21 +325,13 @@ def _asc_date(text: str) -> float | None:
 
     It is of the recording computer's clock, taken in the time zone of this one.
     """
-    found = _ASC_DATE.match(text.strip())
-    month = _MONTHS.get(found["month"].lower()) if found else None
-    if found is None or month is None:
-        return None
-    hour = int(found["hour"])
-    if found["half"]:
-        hour = hour % 12 + (12 if found["half"].lower() == "pm" else 0)
-    try:
-        day = datetime(
-            int(found["year"]), month, int(found["day"]), hour, int(found["minute"]),
-            int(found["second"]),
-        )  # fmt: skip
-        return day.timestamp() + float(found["part"] or 0.0)
-    except (ValueError, OverflowError, OSError):
-        return None
+    words = text.lower().split()
+    words[:1] = [_GERMAN.get(month[:3], month[:3]) for month in words[:1]]
+    for form in ("%b %d %H:%M:%S %Y", "%b %d %H:%M:%S.%f %Y", "%b %d %I:%M:%S %p %Y",
+                 "%b %d %I:%M:%S.%f %p %Y"):  # fmt: skip
+        with suppress(ValueError, OverflowError, OSError):
+            return datetime.strptime(" ".join(words), form).timestamp()
+    return None
 
 
 # TRC ----------------------------------------------------------------------------------------------
@@ -365,13 +348,6 @@ _TRACE_VERSIONS: Final[Mapping[str, tuple[int, Shape]]] = {
     "2.1": (1, Shape(4, 8, bus=3, size=7, marks={2: "dt fd fb fe bi"})),
 }
 """Place of the stamp and form of lines, by version of the file."""
-_TRACE_NAMES: Final = {
-    "time": ("time", "timestamp"),
-    "id": ("id", "identifier", "canid", "can-id"),
-    "size": ("dlc", "len", "length", "size"),
-    "data": ("data",),
-}
-"""Names of columns in the first line of a log that has no remarks, as CANHacker writes it."""
 
 
 def _trace_form(time: int, shape: Shape, unit: float = 1e-3) -> Form:
@@ -390,12 +366,9 @@ def _trace_form(time: int, shape: Shape, unit: float = 1e-3) -> Form:
 
 def _trace_head(path: Path, block: bytes) -> tuple[int, Form]:
     first, _, below = block.lstrip().partition(b"\n")
-    names = first.decode("latin-1").lower().split()
-    places = {
-        what: next((k for k, name in enumerate(names) if name in said), -1)
-        for what, said in _TRACE_NAMES.items()
-    }
-    if first[:1] != b";" and min(places.values()) >= 0:
+    # Without remarks, as CANHacker writes it, the first line names the columns.
+    places = _places(first.decode("latin-1").split())
+    if first[:1] != b";" and max(places[what] for what in _NEEDED) < LACKING:
         words = below.split()
         stamp = words[places["time"]] if len(words) > places["time"] else b""
         # Milliseconds are whole; seconds have decimals.
@@ -441,6 +414,7 @@ _CANDUMP_LINE: Final = re.compile(
     rb"\w+\s+(?:[RT]X\s+\S+\s+\S+\s+)?"
     rb"[0-9A-Fa-f]{3,8}(?:#|\s+\[\d{1,2}\](?:\s|$))"
 )
+is_candump: Final = _begins(_CANDUMP_LINE.pattern)
 
 
 def _candump_form(words: int) -> Form:
@@ -462,11 +436,6 @@ def _candump_form(words: int) -> Form:
         shapes=tuple(shapes), time=1, time_words=words, socketcan=True, short=3, alone="()[]#",
         dates="iso" if words > 1 else "",
     )  # fmt: skip
-
-
-def is_candump(head: bytes) -> bool:
-    """Return whether a text begins with a line of candump."""
-    return _CANDUMP_LINE.match(head) is not None
 
 
 def _candump_head(path: Path, block: bytes) -> tuple[int, Form]:
@@ -493,7 +462,7 @@ def _candump_head(path: Path, block: bytes) -> tuple[int, Form]:
 
 # CRTD, CanKing, BUSMASTER -------------------------------------------------------------------------
 
-_CRTD_LINE: Final = re.compile(rb"^\d+(?:\.\d+)? \d?(?:C[A-Z]{2}|[RT](?:11|29))\b")
+is_crtd: Final = _begins(rb"\d+(?:\.\d+)? \d?(?:C[A-Z]{2}|[RT](?:11|29))\b")
 # ``seconds [bus]R11 id bytes``; R for received, T for sent, 11 or 29 bits (Open Vehicles, *CRTD CAN
 # Log Format*). Version 1 had one bus.
 _CRTD: Final = Form(
@@ -507,7 +476,7 @@ _CRTD: Final = Form(
     bus=1,
 )
 
-_CANKING_HEAD: Final = re.compile(rb"\s*Chn\s+Identifier\s+Flg\b", re.IGNORECASE)
+is_canking: Final = _begins(rb"\s*Chn\s+Identifier\s+Flg\b")
 _CANKING: Final = Form(
     shapes=(
         Shape(1, 4, 0, 3, 2, marks={-1: "r t", 2: "x xr xt n r t e w"}),
@@ -518,7 +487,7 @@ _CANKING: Final = Form(
     extended="x xr xt",
 )
 
-_BUSMASTER_HEAD: Final = re.compile(rb"\s*\*\*\*BUSMASTER", re.IGNORECASE)
+is_busmaster: Final = _begins(rb"\s*\*\*\*BUSMASTER")
 _BUSMASTER: Final = Form(
     shapes=(
         Shape(marks={1: "rx tx", 4: "sr xr"}, kind=NOTHING),
@@ -527,21 +496,6 @@ _BUSMASTER: Final = Form(
     remark="*",
     extended="x",
 )
-
-
-def is_crtd(head: bytes) -> bool:
-    """Return whether a text begins with a record of CRTD."""
-    return _CRTD_LINE.match(head) is not None
-
-
-def is_canking(head: bytes) -> bool:
-    """Return whether a text begins with the header of CanKing's window."""
-    return _CANKING_HEAD.match(head) is not None
-
-
-def is_busmaster(head: bytes) -> bool:
-    """Return whether a text begins as BUSMASTER's logs do."""
-    return _BUSMASTER_HEAD.match(head) is not None
 
 
 def _canking_head(path: Path, block: bytes) -> tuple[int, Form]:
@@ -562,24 +516,9 @@ def _busmaster_head(path: Path, block: bytes) -> tuple[int, Form]:
 
 # Tables -------------------------------------------------------------------------------------------
 
-_NAMES: Final[Mapping[str, frozenset[str]]] = {
-    "time": frozenset(
-        ("time", "timestamp", "time stamp", "abs time", "time abs", "time s", "abs time sec",
-         "time sec",
-         "absolute time", "timestampepoch")
-    ),
-    "id": frozenset(
-        ("id", "arb id", "arbid", "can id", "canid", "identifier", "arbitration id", "msg id",
-         "message id", "id hex", "can id hex")
-    ),
-    "extended": frozenset(("extended", "ext", "xtd", "ide", "type", "flags", "frame type")),
-    "bus": frozenset(("channel", "bus", "network", "chn", "busid", "busnum")),
-    "size": frozenset(("dlc", "len", "length", "size", "datalength")),
-    "data": frozenset(("data", "payload", "data bytes", "databytes", "data hex", "bytes")),
-    "remote": frozenset(("remote", "rtr")),
-    "error": frozenset(("error",)),
-}  # fmt: skip
+_NAMES: Final = words_in("frames")
 """What columns of frames are called."""
+_NEEDED: Final = ("time", "id", "size", "data")
 _BYTE: Final = re.compile(r"(?:b|d|data|byte|data ?byte|byte ?data) ?(\d{1,2})$")
 _TRUE: Final = "1 t true x e ext extended xtd yes"
 """What says that an identifier has 29 bits, or that a frame is a remote one; 1 is CLX000's type."""
@@ -597,6 +536,19 @@ def _head_lines(head: bytes) -> list[str]:
     return plain_head(head[:_SAMPLE]).split("\n")
 
 
+def _plain(name: str) -> str:
+    return " ".join(re.findall(r"[a-z]+|\d+", name.lower()))
+
+
+def _places(names: Sequence[str]) -> dict[str, int]:
+    """Columns of what `_NAMES` lists."""
+    plain = list(map(_plain, names))
+    return {
+        what: next((k for k, name in enumerate(plain) if name in called), LACKING)
+        for what, called in _NAMES.items()
+    }
+
+
 def _table_header(lines: Sequence[str]) -> tuple[int, str, dict[str, int], list[int]] | None:
     """Find the header of a table of frames.
 
@@ -605,14 +557,11 @@ def _table_header(lines: Sequence[str]) -> tuple[int, str, dict[str, int], list[
     Line, separator, places of what `_NAMES` lists, and those of single bytes; None where there is
     none
     """
-    for k, line in enumerate(lines[:_HEAD_LINES]):
+    for k, line in enumerate(lines[:HEAD_LINES]):
         separator = max(SEPARATORS, key=line.count)
-        names = [" ".join(re.findall(r"[a-z]+|\d+", c.lower())) for c in cells(line, separator)]
-        places = {
-            what: next((i for i, name in enumerate(names) if name in said), LACKING)
-            for what, said in _NAMES.items()
-        }
-        single = [i for i, name in enumerate(names) if _BYTE.match(name)]
+        names = cells(line, separator)
+        places = _places(names)
+        single = [i for i, name in enumerate(names) if _BYTE.match(_plain(name))]
         held = single or places["data"] < LACKING
         if max(places["time"], places["id"]) < LACKING and held:
             return k, separator, places, single

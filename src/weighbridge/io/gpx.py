@@ -14,7 +14,7 @@ from weighbridge.errors import DriveError
 from weighbridge.io.libraries import importing
 from weighbridge.io.log import Log
 from weighbridge.io.mapping import TableMapping
-from weighbridge.io.understood import Lines
+from weighbridge.io.understood import Lines, text_of
 from weighbridge.signals import Problem
 from weighbridge.signals.cleaning import clean_columns
 from weighbridge.signals.units import to_si
@@ -59,7 +59,7 @@ def read_gpx(path: Path, table: str | None, mapping: TableMapping | None) -> Log
             f"{path} declares XML entities, which GPX has no use for and which can be made to "
             "fill any memory; remove its <!DOCTYPE …>"
         )
-    text = _text(data)
+    text = text_of(data)
 
     def points_of(text: str) -> list[Any]:
         """Return the track points of a whole GPX text; a ValueError says why there are none."""
@@ -102,14 +102,6 @@ def read_gpx(path: Path, table: str | None, mapping: TableMapping | None) -> Log
     log.signals, problems = clean_columns(time, columns, path.name)
     log.problems += problems
     return log
-
-
-def _text(data: bytes) -> str:
-    try:
-        text = data.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        text = data.decode("latin-1")
-    return text.replace("\x00", "")
 
 
 def _salvaged(text: str, points_of: Callable[[str], list[Any]]) -> tuple[list[Any], Lines]:

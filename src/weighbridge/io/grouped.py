@@ -18,6 +18,7 @@ from weighbridge.errors import DriveError
 from weighbridge.io.channels import Recording, drafter, reader
 from weighbridge.io.columns import stated_unit, unit_suffix
 from weighbridge.io.draft_text import (
+    HEAD_LINES,
     decimal_mark,
     first_values,
     of_numbers,
@@ -28,21 +29,13 @@ from weighbridge.io.draft_time import is_number, text_time_format
 from weighbridge.io.log import Log
 from weighbridge.io.mapping import TableMapping, TimeColumn
 from weighbridge.io.naming import is_time, words_of
-from weighbridge.io.table import (
-    TextFormat,
-    cells,
-    column_list,
-    head,
-    plain_head,
-    read_text,
-)
+from weighbridge.io.table import TextFormat, column_list, head, read_text
 from weighbridge.io.tabular import read_csv
+from weighbridge.io.understood import cells, plain_head
 from weighbridge.signals import Floats
 
 _STAMPS: Final = frozenset(("stamp", "marke", "marque", "marca", "merk"))
 """What VCDS calls a stamp in the languages of its releases, beside the names of times."""
-
-_HEAD_LINES: Final = 60
 
 _DEEPEST: Final = 5
 """Lines of a header at most: groups, places, names in two lines, units."""
@@ -92,7 +85,7 @@ def open_grouped(path: Path, time: TimeColumn) -> Recording:
     DriveError
         A mapping names a time that is not there, or the header cannot be read.
     """
-    header = _header(head(path, _HEAD_LINES))
+    header = _header(head(path, HEAD_LINES))
     if header is None:
         raise DriveError(f"{path} has no header with several times; convert it to a plain table")
     called = {header.names[k] for k in header.clocks if k >= 0}

@@ -14,7 +14,8 @@ from weighbridge.errors import DriveError
 from weighbridge.io.channels import Recording
 from weighbridge.io.draft_time import is_clock
 from weighbridge.io.mapping import TimeColumn
-from weighbridge.io.table import TextFormat, head, plain_head, read_text, time_seconds
+from weighbridge.io.table import TextFormat, head, read_text, time_seconds
+from weighbridge.io.understood import plain_head
 
 _HEAD_LINES: Final = 20_000
 

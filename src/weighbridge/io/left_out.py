@@ -13,7 +13,8 @@ import pyarrow.parquet as pq
 from weighbridge.errors import DriveError
 from weighbridge.io.draft_text import HEAD_LINES, text_format
 from weighbridge.io.naming import recognise_all
-from weighbridge.io.table import cells, head
+from weighbridge.io.table import head
+from weighbridge.io.understood import cells
 from weighbridge.messages import phrase
 from weighbridge.signals import Problem
 

@@ -25,49 +25,18 @@ from weighbridge.io.table import (
     MOST_COLUMNS,
     SEPARATORS,
     RawTable,
-    cells,
     column_list,
     numbers_with_units,
-    plain_head,
     read_text,
 )
+from weighbridge.io.understood import cells, plain_head
+from weighbridge.io.vocabulary import words_in
 from weighbridge.messages import Problem, refused
 from weighbridge.signals import Floats
 from weighbridge.signals.units import UNITS, from_si, to_si
 
-_NAMES: Final = frozenset(
-    ("pid", "name", "parameter", "param", "param_name", "signal", "signal_name", "channel",
-     "metric", "key", "variable", "field", "parameter name", "sensor name", "diagnostic",
-     "diagnostic name", "measurement", "measure name", "tag", "tag name", "channel name", "sensor",
-     "signalname", "item", "command name", "command", "messgroesse", "measurand")
-)  # fmt: skip
-_VALUES: Final = frozenset(
-    ("value", "val", "values", "wert", "valeur", "valor", "reading", "data", "numeric value",
-     "double value", "measure value", "response value", "obd response value", "response",
-     "signal value", "messwert", "raw value")
-)  # fmt: skip
-_UNITS: Final = frozenset(
-    (
-        "unit",
-        "units",
-        "einheit",
-        "unite",
-        "unidad",
-        "uom",
-        "unit of measure",
-        "units of measure",
-        "unit name",
-        "measurement unit",
-    )
-)
-_VEHICLES: Final = frozenset(
-    ("device", "device name", "device id", "vehicle", "vehicle name", "vehicle id", "vin", "asset",
-     "asset id", "asset name", "unit id", "truck", "fahrzeug", "serial number", "registration")
-)  # fmt: skip
-_PLACES: Final = {
-    "latitude": ("latitude", "lat"),
-    "longitude": ("longitude", "longtitude", "lon", "lng"),
-}
+_COLUMNS: Final = words_in("long tables")
+_PLACES: Final = {quantity: _COLUMNS[quantity] for quantity in ("latitude", "longitude")}
 
 # Numbers with commas in them, and those whose commas can part thousands.
 _WITH_COMMA: Final = r"^[-+]?[\d.]*,[\d.,]*$"
@@ -89,13 +58,13 @@ def _plain(name: str) -> str:
     return " ".join(words_of(name.strip().strip('"').replace("_", " ")))
 
 
-def _place(names: list[str], among: frozenset[str] | tuple[str, ...]) -> int | None:
+def _place(names: list[str], among: Sequence[str]) -> int | None:
     return next((k for k, name in enumerate(names) if _plain(name) in among), None)
 
 
 def _places(names: list[str], rows: Sequence[Sequence[str]]) -> tuple[int | None, int | None]:
     """Columns of names and of values: by what they are called, else by what is in them."""
-    named, valued = _place(names, _NAMES), _place(names, _VALUES)
+    named, valued = (_place(names, _COLUMNS[key]) for key in ("names", "values"))
     reported = [row for row in rows if len(row) == len(names)]
     if named is None and reported:
         named = next((k for k in range(len(names)) if _names_quantities(reported, k)), None)
@@ -185,7 +154,7 @@ def recording_of(raw: RawTable, time: TimeColumn) -> Recording:
     of_one = _of_one_vehicle(raw, names)
     found = Recording([], notes=list(raw.notes))
     seconds = _seconds(raw, names, time, found)
-    united = _place(names, _UNITS)
+    united = _place(names, _COLUMNS["units"])
     numeric = [valued, *(k for k in map(partial(_place, names), _PLACES.values()) if k is not None)]
     thousands = _have_thousands([raw.column(k) for k in numeric])
     if thousands:
@@ -237,7 +206,7 @@ def _of_one_vehicle(raw: RawTable, names: list[str]) -> pl.Series | None:
     DriveError
         There are several: a drive is of one.
     """
-    place = _place(names, _VEHICLES)
+    place = _place(names, _COLUMNS["vehicles"])
     if place is None:
         return None
     reported = raw.column(place).cast(pl.String).str.strip_chars()

@@ -180,12 +180,16 @@ def _unpacked(chunk: Any) -> bytes:
 
         return bytes(zstandard.ZstdDecompressor().stream_reader(chunk.data).read(most))
     if chunk.compression == "lz4":
-        from lz4.frame import LZ4FrameDecompressor  # type: ignore[import-untyped]
-
-        return bytes(LZ4FrameDecompressor().decompress(chunk.data, max_length=most))
+        return _unpacked_lz4(chunk.data, most)
     if chunk.compression:
         raise ValueError(f"its compression {chunk.compression!r} is not read")
     return bytes(chunk.data)
+
+
+def _unpacked_lz4(data: bytes, most: int) -> bytes:
+    from lz4.frame import LZ4FrameDecompressor  # type: ignore[import-untyped]
+
+    return bytes(LZ4FrameDecompressor().decompress(data, max_length=most))
 
 
 def open_bag(path: Path, time: TimeColumn) -> Recording:
@@ -444,25 +448,13 @@ def _bound_chunks(path: Path, bag: Any) -> None:
 
         return decompress
 
-    known = {bz2.decompress: _bz2, _library_lz4(): _lz4}
+    from lz4.frame import decompress
+
+    known = {
+        bz2.decompress: lambda data, most: bz2.BZ2Decompressor().decompress(data, max_length=most),
+        decompress: _unpacked_lz4,
+    }
     for place, chunk in bag.chunks.items():
         if chunk.decompressor in known:
             unpack = bounded(place, known[chunk.decompressor])
             bag.chunks[place] = chunk._replace(decompressor=unpack)
-
-
-def _library_lz4() -> Callable[[bytes], bytes]:
-    from lz4.frame import decompress
-
-    found: Callable[[bytes], bytes] = decompress
-    return found
-
-
-def _bz2(data: bytes, most: int) -> bytes:
-    return bz2.BZ2Decompressor().decompress(data, max_length=most)
-
-
-def _lz4(data: bytes, most: int) -> bytes:
-    from lz4.frame import LZ4FrameDecompressor
-
-    return bytes(LZ4FrameDecompressor().decompress(data, max_length=most))

@@ -24,7 +24,9 @@ from weighbridge.io.vocabulary import (
     PHRASES,
     SILENT,
     TIME_PHRASES,
+    WORDS,
     spelled,
+    words_in,
 )
 from weighbridge.signals import QUANTITIES
 from weighbridge.signals.units import UNITS
@@ -85,16 +87,8 @@ _WITH_WORD: Final = {
 }
 """The same by each of their words."""
 
-_WITH_UNIT: Final = {
-    "vehicle_speed": ("v",),
-    "engine_speed": ("speed", "ne", "rev", "n", "ecm n", "ems n", "dme n", "pcm n"),
-    "gnss_speed": ("gps v",),
-    "fuel_rate": ("fuel consumption", "consumption", "verbrauch"),
-    **{f"accel_{a}": (f"g{a}",) for a in "xyz"},
-    **{f"gyro_{a}": (f"g{a}", f"rot {a}", f"gy{a}") for a in "xyz"},
-}
-"""Words that are a quantity only where the log states a unit of it: v may be volts as well, n a
-force, and gx an acceleration or a rate."""
+_WITH_UNIT: Final = words_in("with unit")
+"""Words that are a quantity only where the log states a unit of it."""
 
 _NOT: Final = {
     q: frozenset(spelled(words)) | frozenset(map(_plain, words)) for q, words in AGAINST.items()
@@ -171,25 +165,6 @@ _SYMBOLS: Final = {
 _OTHERWISE: Final[dict[str, str | None]] = {"gps": None, "ms": "mps"}
 """What a unit at the end of a name means where no quantity of that name has it: g/s may be the
 satellites', and ms m/s."""
-
-_MEASURED: Final = frozenset(
-    (
-        "actual",
-        "act",
-        "actl",
-        "feedback",
-        "fbk",
-        "fdbk",
-        "measured",
-        "meas",
-        "ist",
-        "istwert",
-        "current",
-        "cur",
-        "engaged",
-    )
-)
-"""Words of a signal that is measured and not wanted."""
 
 _WANTED_TOO: Final = frozenset(("engine_torque", "engine_torque_fraction", "gear"))
 """Quantities of which a log often has what is measured and what is wanted."""
@@ -526,7 +501,7 @@ def recognise_all(
     # What is measured comes before what may be wanted. Of names that say the same, the one without
     # more words: "TPS" before "TPS raw".
     order = [
-        (named.quantity in _WANTED_TOO and bool(said & _MEASURED), named.score, -len(said))
+        (named.quantity in _WANTED_TOO and bool(said & WORDS["measured"]), named.score, -len(said))
         for said, named in zip(words, found, strict=True)
     ]
     for k, named in enumerate(found):

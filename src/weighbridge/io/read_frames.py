@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -13,7 +12,7 @@ import polars as pl
 from weighbridge.arguments import check_text, is_frame, type_name
 from weighbridge.errors import ConfigError
 from weighbridge.io.channels import log_of
-from weighbridge.io.columns import UnitlessColumnError, parse_column, time_unit
+from weighbridge.io.columns import time_unit
 from weighbridge.io.log import Log
 from weighbridge.io.long_csv import are_long, names_in, recording_of
 from weighbridge.io.mapping import (
@@ -27,7 +26,7 @@ from weighbridge.io.mapping import (
 from weighbridge.io.quiet import PARSE_ERRORS
 from weighbridge.io.read import joined_drive
 from weighbridge.io.table import RawTable, column_list
-from weighbridge.io.tabular import read_canonical, read_mapped
+from weighbridge.io.tabular import are_canonical, read_canonical, read_mapped
 from weighbridge.messages import Problem
 from weighbridge.signals import Drive, DriveInfo
 from weighbridge.signals.catalogue import TABLES, TIME_COLUMN
@@ -87,7 +86,7 @@ def _read(raws: list[RawTable], mappings: tuple[TableMapping, ...]) -> list[Log]
             logs.append(log_of(raw.path, recording_of(raw, time), own, mapping))
             continue
         named = mapping is not None and any(_has(raw, s) for s in mapping.signals)
-        if mapping is None or not mapping.signals or (not named and _is_canonical(raw, own)):
+        if mapping is None or not mapping.signals or (not named and are_canonical(raw.names, own)):
             logs.append(read_canonical(raw, own))
             continue
         alike = [r for r, m in zip(raws, known, strict=True) if m is mapping]
@@ -131,17 +130,6 @@ def _is_long(raw: RawTable, mapping: TableMapping | None) -> bool:
 
 def _has(raw: RawTable, signal: MappedSignal) -> bool:
     return raw.index(signal.column) is not None
-
-
-def _is_canonical(raw: RawTable, table: str | None) -> bool:
-    """Return whether a table has a time and a column of canonical names."""
-    if not any(time_unit(name) for name in raw.names):
-        return False
-    for name in raw.names:
-        with contextlib.suppress(UnitlessColumnError):
-            if parse_column(name, table) is not None:
-                return True
-    return False
 
 
 def _raw(name: str, frame: Any, *, mapped: bool) -> RawTable:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import datetime as dt
 import io
 import re
@@ -17,8 +16,11 @@ import polars as pl
 from weighbridge.errors import DriveError
 from weighbridge.io.quiet import PARSE_ERRORS, first_line, quietly
 from weighbridge.io.understood import (
+    UTF_16,
     Lines,
+    cells,
     strange_rows,
+    text_of,
     without_open_quotes,
     without_strange_rows,
 )
@@ -42,8 +44,6 @@ _LONGEST_NAME: Final = 60
 
 _HEAD: Final = 1 << 18
 """Bytes at the beginning of a text that hold its header and its first rows."""
-
-_UTF_16: Final = (b"\xff\xfe", b"\xfe\xff")
 
 # Stamps before and after midnight that have to agree that it was there.
 _AROUND: Final = 3
@@ -328,26 +328,12 @@ def head(path: Path, count: int) -> list[str]:
     """
     with path.open("rb") as file:
         data = file.read(_HEAD)
-    wide = data[:2] in _UTF_16
+    wide = data[:2] in UTF_16
     if len(data) == _HEAD and not wide:
         # The last line may end within a character.
         data = data[: data.rfind(b"\n") + 1] or data
     text, _ = _decoded(path, data, TextFormat())
     return [line.rstrip("\r") for line in text.split("\n", count)[:count]]
-
-
-def plain_head(begin: bytes) -> str:
-    """First bytes of a file as text, without a mark of its encoding."""
-    return begin.decode("utf-8", "replace").removeprefix("\ufeff")
-
-
-def cells(line: str, separator: str) -> list[str]:
-    """Split a line at its separators, quotes taken off where they are closed."""
-    try:
-        found = next(csv.reader([line], delimiter=separator), [])
-    except csv.Error:
-        found = line.split(separator)
-    return [cell.strip() for cell in found]
 
 
 def _decoded(path: Path, data: bytes, fmt: TextFormat) -> tuple[str, list[Problem]]:
@@ -361,16 +347,8 @@ def _decoded(path: Path, data: bytes, fmt: TextFormat) -> tuple[str, list[Proble
             raise DriveError(
                 f"{path} is not {fmt.encoding}{place}: set encoding in [csv] of the mapping"
             ) from None
-    if data[:2] in _UTF_16:
-        return data.decode("utf-16", errors="replace"), []
-    notes = []
-    if b"\x00" in data:
-        notes.append(Problem.of("file.zero_bytes", count=data.count(0)))
-        data = data.replace(b"\x00", b"")
-    try:
-        return data.decode("utf-8-sig"), notes
-    except UnicodeDecodeError:
-        return data.decode("latin-1"), notes
+    zeros = 0 if data[:2] in UTF_16 else data.count(0)
+    return text_of(data), [Problem.of("file.zero_bytes", count=zeros)] * bool(zeros)
 
 
 def _separator(path: Path, header: str) -> str:
@@ -445,7 +423,7 @@ def time_seconds(
         The column holds no times in that format.
     """
     if index not in table.plain and table.column(index).dtype.is_temporal():
-        return (*_temporal(table.column(index)), [])
+        return (*seconds_of(table.column(index)), [])
     if time_format is None:
         values, notes = table.numbers(index)
         seconds = values * unit_factor if unit_factor != 1.0 else values
@@ -461,13 +439,13 @@ def time_seconds(
     else:
         try:
             with quietly():
-                parsed = _parse_datetime(text, time_format)
+                parsed = parsed_dates(text, time_format)
         except PARSE_ERRORS as e:
             raise DriveError(
                 f"{table.path}: column {table.names[index]!r} cannot be read in the format "
                 f"{time_format!r} ({first_line(e)}); set format in [time] of the mapping"
             ) from None
-        seconds, absolute = _temporal(parsed)
+        seconds, absolute = seconds_of(parsed)
     present = text.is_not_null() & (text != "")
     lost = int(present.sum()) - int(np.count_nonzero(np.isfinite(seconds)))
     if lost > _TEXT_PART * max(int(present.sum()), 1):
@@ -486,7 +464,8 @@ def since_1970(seconds: Floats) -> bool:
     return bool(known.size) and DATES[0] < float(np.median(known)) < DATES[1]
 
 
-def _parse_datetime(text: pl.Series, time_format: str) -> pl.Series:
+def parsed_dates(text: pl.Series, time_format: str) -> pl.Series:
+    """Dates of texts, in a format as `time_seconds` takes it; null where one is none."""
     if time_format != "iso":
         return text.str.to_datetime(time_format, strict=False, time_unit="us")
     # One spelling for all: a blank as T, no zone but an offset applied below.
@@ -496,7 +475,8 @@ def _parse_datetime(text: pl.Series, time_format: str) -> pl.Series:
     return plain.str.to_datetime("%Y-%m-%dT%H:%M:%S%.f", strict=False, time_unit="us")
 
 
-def _temporal(series: pl.Series) -> tuple[Floats, bool]:
+def seconds_of(series: pl.Series) -> tuple[Floats, bool]:
+    """Dates, times of day or durations [s], and whether they count from 1970."""
     if series.dtype == pl.Time:
         return unwrapped(series.cast(pl.Int64).cast(pl.Float64).to_numpy() * 1e-9), False
     if isinstance(series.dtype, pl.Duration):

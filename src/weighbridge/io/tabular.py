@@ -7,6 +7,7 @@ import json
 import re
 import shlex
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Final
 
@@ -20,6 +21,7 @@ from weighbridge.io.columns import (
     parse_column,
     time_unit,
 )
+from weighbridge.io.draft_text import of_numbers
 from weighbridge.io.draft_time import counts_minutes, minutes_problem
 from weighbridge.io.log import Log
 from weighbridge.io.mapping import TableMapping, UnnamedError, lacking, resolved_unit
@@ -40,8 +42,6 @@ from weighbridge.signals.tomlfile import Faults
 from weighbridge.signals.units import UNITS, to_si
 
 _PARTED: Final = re.compile(f"[{re.escape(''.join(SEPARATORS))}]")
-_NUMBER: Final = re.compile(r"\s*[-+]?[\d.:]*\d[\d.:]*(?:[eE][-+]?\d+)?\s*$")
-"""A number or a time of day."""
 
 
 def read_csv(path: Path, table: str | None, mapping: TableMapping | None) -> Log:
@@ -242,7 +242,8 @@ def _no_time(raw: RawTable, known: bool) -> DriveError:
 
 def _named_hint(raw: RawTable) -> str:
     """What to do about a mapping whose columns are not there."""
-    if raw.separator and _of_numbers(raw.names):
+    parts = [cell.strip() for name in raw.names for cell in _PARTED.split(name) if cell.strip()]
+    if raw.separator and parts and of_numbers(parts):
         names = json.dumps([TIME_COLUMN, "vehicle_speed_kmh", "-"])
         return (
             f": these are the values of its first line, and it has no header: name its "
@@ -251,18 +252,12 @@ def _named_hint(raw: RawTable) -> str:
         )
     other = _other_separator(raw)
     cells = [cell for name in raw.names for cell in name.split(other)] if other else raw.names
-    if _canonical(cells):
+    if are_canonical(cells, None):
         return (
             ": these names need no mapping; leave out --mapping, or the line mapping of a vehicle "
             "file that names it"
         )
     return f"; set separator = {json.dumps(other)} there" if other else ""
-
-
-def _of_numbers(names: Sequence[str]) -> bool:
-    """Whether what means names is a row of numbers and times, whatever parts them."""
-    cells = [cell for name in names for cell in _PARTED.split(name) if cell.strip()]
-    return bool(cells) and sum(_NUMBER.match(cell) is not None for cell in cells) > 0.5 * len(cells)
 
 
 def _other_separator(raw: RawTable) -> str:
@@ -271,13 +266,15 @@ def _other_separator(raw: RawTable) -> str:
     return next((s for s in others if any(s in name for name in raw.names)), "")
 
 
-def _canonical(names: Sequence[str]) -> bool:
-    """Whether names are those of a table that needs no mapping."""
-    try:
-        known = [name for name in names if parse_column(name, None) is not None]
-    except UnitlessColumnError:
+def are_canonical(names: Sequence[str], table: str | None) -> bool:
+    """Return whether names are a time's and a quantity's, so that they need no mapping."""
+    if not any(map(time_unit, names)):
         return False
-    return bool(known) and any(map(time_unit, names))
+    for name in names:
+        with suppress(UnitlessColumnError):
+            if parse_column(name, table) is not None:
+                return True
+    return False
 
 
 def _near(column: str, raw: RawTable) -> str:

@@ -22,7 +22,7 @@ from weighbridge.errors import DriveError
 from weighbridge.io.channels import Channel, Recording
 from weighbridge.io.mapping import TimeColumn
 from weighbridge.io.table import MOST_COLUMNS
-from weighbridge.io.understood import Lines
+from weighbridge.io.understood import Lines, text_of
 from weighbridge.messages import Problem
 from weighbridge.signals import Floats
 
@@ -97,7 +97,7 @@ def records_of(path: Path) -> Iterator[Any]:
     DriveError
         It is a list that is cut off.
     """
-    text = path.read_bytes().decode("utf-8-sig", "replace").replace("\x00", "")
+    text = text_of(path.read_bytes())
     if text.lstrip().startswith("["):
         try:
             held = json.loads(text)

@@ -26,6 +26,35 @@ _FEW: Final = 0.01
 _LOOKED_AT: Final = 1000
 
 
+UTF_16: Final = (b"\xff\xfe", b"\xfe\xff")
+"""First bytes of a text in UTF-16."""
+
+
+def text_of(data: bytes) -> str:
+    """Text of a file in UTF-8 or UTF-16, else in Latin-1, without bytes of zero."""
+    if data[:2] in UTF_16:
+        return data.decode("utf-16", errors="replace")
+    data = data.replace(b"\x00", b"")
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return data.decode("latin-1")
+
+
+def plain_head(begin: bytes) -> str:
+    """First bytes of a file as text, without a mark of its encoding."""
+    return begin.decode("utf-8", "replace").removeprefix("\ufeff")
+
+
+def cells(line: str, separator: str) -> list[str]:
+    """Split a line at its separators, quotes taken off where they are closed."""
+    try:
+        found = next(csv.reader([line], delimiter=separator), [])
+    except csv.Error:
+        found = line.split(separator)
+    return [cell.strip() for cell in found]
+
+
 class Lines:
     """Lines that a reader has seen, and those that it did not understand.
 
@@ -186,20 +215,11 @@ class _Rows:
     def beyond(self, places: Ints) -> Bools:
         """Which of these rows have a value beyond the last column."""
         found = [
-            any(c.strip() for c in _cells(line, self._separator)[self._columns :])
+            any(cells(line.decode("utf-8", "replace"), self._separator)[self._columns :])
             for k in places.tolist()
             for line in (self._data[self.starts[k] : self.ends[k]],)
         ]
         return np.array(found, dtype=bool)
-
-
-def _cells(line: bytes, separator: str) -> list[str]:
-    """Cells of a line."""
-    text = line.decode("utf-8", "replace")
-    try:
-        return next(csv.reader([text], delimiter=separator), [])
-    except csv.Error:
-        return text.split(separator)
 
 
 def without_open_quotes(data: bytes) -> tuple[bytes, Ints]:

@@ -22,7 +22,7 @@ from weighbridge.errors import DriveError
 from weighbridge.io.log import Log
 from weighbridge.io.mapping import MappedSignal, TableMapping, lacking, resolved_unit
 from weighbridge.io.table import column_list, unwrapped
-from weighbridge.io.understood import Lines, number_of
+from weighbridge.io.understood import Lines, number_of, text_of
 from weighbridge.io.way import way_ratio
 from weighbridge.signals import Bools, Floats, Problem
 from weighbridge.signals.cleaning import clean_columns
@@ -65,7 +65,7 @@ def read_vbo(path: Path, table: str | None, mapping: TableMapping | None) -> Log
     ConfigError
         The mapping gives a column no unit that it could be in.
     """
-    text = _text(path)
+    text = text_of(path.read_bytes())
     head, sections = _sections(text)
     names = [n.lower() for n in " ".join(sections.get("column names", [])).split()]
     if not names or "data" not in sections:
@@ -209,14 +209,6 @@ def _mapped(
         elif not signal.optional and mapping is not None:
             log.lacking.append(lacking(f"{log.path.name}: column", signal, mapping.source))
     return found
-
-
-def _text(path: Path) -> str:
-    data = path.read_bytes().replace(b"\x00", b"")
-    try:
-        return data.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        return data.decode("latin-1")
 
 
 def _sections(text: str) -> tuple[str, dict[str, list[str]]]:

@@ -11,8 +11,8 @@ _FILE: Final = ConfigParser(interpolation=None, delimiters="=")
 _FILE.read_string(files("weighbridge.io").joinpath("names.ini").read_text(encoding="utf-8"))
 
 
-def _section(name: str) -> dict[str, tuple[str, ...]]:
-    """Phrases of a section by its keys; a star is each axis."""
+def words_in(name: str) -> dict[str, tuple[str, ...]]:
+    """Phrases of a section of `names.ini` by its keys; a star is each axis."""
     found = {}
     for key, text in _FILE[name].items():
         phrases = [" ".join(phrase.split()) for phrase in text.split(",")]
@@ -22,10 +22,10 @@ def _section(name: str) -> dict[str, tuple[str, ...]]:
 
 
 def _keys_by_word(name: str) -> dict[str, str]:
-    return {word: key for key, words in _section(name).items() for word in words}
+    return {word: key for key, words in words_in(name).items() for word in words}
 
 
-_NAMES: Final = [_section(name) for name in _FILE.sections() if name.split()[0] == "names"]
+_NAMES: Final = [words_in(name) for name in _FILE.sections() if name.split()[0] == "names"]
 
 PHRASES: Final = {
     quantity: tuple(phrase for each in _NAMES for phrase in each.get(quantity, ()))
@@ -33,25 +33,31 @@ PHRASES: Final = {
 }
 """What loggers call each quantity, in any language."""
 
-TIME_PHRASES: Final = frozenset(_section("times")["names"])
+TIME_PHRASES: Final = frozenset(words_in("times")["names"])
 """What loggers call their time, likewise."""
 
-TIME_WORDS: Final = frozenset(_section("times")["words"])
+COUNTERS: Final = frozenset(("", *words_in("times")["counters"]))
+"""What loggers call a number that counts their rows; it may have no name."""
+
+TIME_WORDS: Final = frozenset(words_in("times")["words"])
 """Words that make a name likely to be that of a time."""
 
-BARE: Final = _section("bare")
+BARE: Final = words_in("bare")
 """Names that only say in what something is measured, by what it may be where the values fit."""
 
-AGAINST: Final = {quantity: frozenset(words) for quantity, words in _section("against").items()}
+AGAINST: Final = {quantity: frozenset(words) for quantity, words in words_in("against").items()}
 """Words with which a name means something else."""
 
 LONG: Final = _keys_by_word("short")
 """Words by their shortened spelling."""
 
-SILENT: Final = frozenset().union(*_section("silent").values())
+WORDS: Final = {kind: frozenset(words) for kind, words in words_in("words").items()}
+"""Words of names by what they are, as `names.ini` explains."""
+
+SILENT: Final = WORDS["noise"] | WORDS["senders"]
 """Words that say nothing of the quantity, but who sends it or that it is measured."""
 
-ASPECTS: Final = {quantity: frozenset(words) for quantity, words in _section("aspects").items()}
+ASPECTS: Final = {quantity: frozenset(words) for quantity, words in words_in("aspects").items()}
 """Words that show how a quantity is measured, or where: with or without them it is the same."""
 
 UNIT_TEXTS: Final = _keys_by_word("units")
@@ -60,7 +66,7 @@ UNIT_TEXTS: Final = _keys_by_word("units")
 SPELLED_UNITS: Final = _keys_by_word("units in words")
 """Words of units that are spelled out."""
 
-OF_ANOTHER: Final = frozenset(_section("another")["words"])
+OF_ANOTHER: Final = WORDS["another"]
 """Words of a request, a bound, an average, a check or a state of a signal."""
 
 
