@@ -64,7 +64,7 @@ since trouble codes were cleared."""
 _TORN: Final = 0.05
 """Part of the cells of a column that torn lines may have made something else [-]."""
 
-_FASTEST: Final = 4.0
+FASTEST: Final = 4.0
 """Mean of the size of a vehicle's acceleration, at most: tyres carry some 10, hardly ever used for
 long [m/s^2]."""
 
@@ -220,18 +220,18 @@ def by_motion(times: list[DraftTime], swing: float) -> list[DraftTime]:
 
     judged = []
     for time in times:
-        if time.row_rate is not None or hurry(time) <= _FASTEST:
+        if time.row_rate is not None or hurry(time) <= FASTEST:
             judged.append(time)
             continue
         question = (
             f"by {time.column!r} in {time.unit or 'seconds'} the speed changes by "
             f"{hurry(time):.0f} m/s^2 in the mean, as no vehicle's does"
         )
-        if time.guessed and time.unit == "s" and hurry(time, 60.0) <= _FASTEST:
+        if time.guessed and time.unit == "s" and hurry(time, 60.0) <= FASTEST:
             question += "; taken as minutes"
             time = replace(time, unit="min", seconds=60.0 * time.seconds)
         judged.append(replace(time, questions=[*time.questions, question]))
-    fit = [t for t in judged if t.row_rate is not None or hurry(t) <= _FASTEST]
+    fit = [t for t in judged if t.row_rate is not None or hurry(t) <= FASTEST]
     best, *others = fit + [t for t in judged if not any(t is f for f in fit)]
     if others:
         names = column_list(t.column for t in others)

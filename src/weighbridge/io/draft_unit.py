@@ -23,7 +23,7 @@ NEAR: Final = 0.08
 tenth too much, satellites miss the peaks."""
 
 SLOWEST: Final = 3.0
-"""Slower in the median, or in the highest, nothing is compared [m/s]."""
+"""Slower, nothing is compared: gears and clutches hide how engine and vehicle go together [m/s]."""
 
 _WHOLE: Final = 0.1
 """Part of a step by which a rounded value may miss a whole number of them [-]."""
@@ -56,12 +56,12 @@ _HARDEST: Final = 0.99
 _GENTLE: Final = 0.45
 """Deceleration of a stop at least, in the hardest of a drive: trucks reach 0.8 [m/s^2]."""
 
-_WHILE: Final = 3.0
+WHILE: Final = 3.0
 """Time over which a speed changes by more than its steps [s]."""
 
-_ALONG: Final = 0.6
-"""Correlation of these changes with an acceleration, at least: grade is in the one, not in the
-other [-]."""
+TOGETHER: Final = 0.6
+"""Correlation of what goes together, at least: grade is in an acceleration and not in the change of
+speed, gears are changed, in overrun little air flows, and a battery has a resistance [-]."""
 
 _ALIKE: Final = 0.98
 """Correlation of two speeds of one vehicle, at least [-]."""
@@ -81,6 +81,20 @@ class Values:
     time: Floats
     values: Floats
     unit: str
+
+    def rising(self) -> tuple[Floats, Floats]:
+        """Return the instants of known values in their order, and these values; in SI of a unit."""
+        there = np.isfinite(self.time) & np.isfinite(self.values)
+        order = np.argsort(self.time[there], kind="stable")
+        values = self.values[there][order]
+        return self.time[there][order], to_si(values, self.unit) if self.unit else values
+
+    def at(self, time: Floats) -> Floats:
+        """Return these values at other instants; NaN outside."""
+        x, y = self.rising()
+        if x.size < 2:
+            return np.full(time.size, np.nan)
+        return np.asarray(np.interp(time, x, y, left=np.nan, right=np.nan))
 
 
 def unit_in_name(name: str, stated: str | None) -> str:
@@ -131,10 +145,7 @@ def _with_judged_turns(
         return columns
     way = reported[speed.name]
     v, turns = to_si(way.values, speed.unit), reported[engine.name]
-    known = np.isfinite(turns.time + turns.values)
-    if np.count_nonzero(known) < _FEWEST:
-        return columns
-    n = np.interp(way.time, turns.time[known], turns.values[known])
+    n = turns.at(way.time)
     fast = np.isfinite(n + v) & (v > _FAST)
     if np.count_nonzero(fast) < _FEWEST or np.quantile(n[fast] / v[fast], 0.1) > _TURNS_PER_METRE:
         return columns
@@ -158,7 +169,7 @@ def _with_judged_accelerations(
     values = replace(reported[speed.name], unit=speed.unit)
     gains = [_gain(values, reported[c.name]) for c in axes]
     gain = max(gains, key=lambda pair: pair[1], default=(0.0, 0.0))
-    if gain[1] < _ALONG:
+    if gain[1] < TOGETHER:
         return columns
     unit = min(
         (u for u, other in UNITS.items() if other.dimension == "m/s^2"),
@@ -176,14 +187,11 @@ def _gain(speed: Values, accel: Values) -> tuple[float, float]:
     gain : [unit of the acceleration / (m/s^2)]
     correlation : [-]
     """
-    known = np.isfinite(accel.time + accel.values)
-    moving = np.isfinite(speed.time + speed.values)
-    t, v = speed.time[moving], to_si(speed.values[moving], speed.unit)
-    if np.count_nonzero(known) < _FEWEST or t.size < _FEWEST:
+    (t, v), (at, a) = speed.rising(), accel.rising()
+    if min(t.size, at.size) < _FEWEST:
         return 0.0, 0.0
-    at, a = accel.time[known], accel.values[known]
     whole = np.concatenate([[0.0], np.cumsum(0.5 * (a[1:] + a[:-1]) * np.diff(at))])
-    begin = np.arange(max(t[0], at[0]), min(t[-1], at[-1]), _WHILE)
+    begin = np.arange(max(t[0], at[0]), min(t[-1], at[-1]), WHILE)
     change, sum_ = np.diff(np.interp(begin, t, v)), np.diff(np.interp(begin, at, whole))
     if change.size < _FEWEST or np.ptp(change) == 0.0 or np.ptp(sum_) == 0.0:
         return 0.0, 0.0
@@ -210,12 +218,12 @@ def _judged(
 
 def _by_pace(speed: Values) -> tuple[str, str]:
     """Unit of a speed of a vehicle that stops and goes: in another one it would hardly brake."""
-    there = np.isfinite(speed.time + speed.values)
-    time, values = speed.time[there], np.abs(speed.values[there])
+    time, values = speed.rising()
+    values = np.abs(values)
     if values.size < _FEWEST or values.min() > 1.0 or values.max() > _TOP:
         return "", ""
-    begin = np.arange(time[0], time[-1], _WHILE)
-    changes = np.abs(np.diff(np.interp(begin, time, values))) / _WHILE
+    begin = np.arange(time[0], time[-1], WHILE)
+    changes = np.abs(np.diff(np.interp(begin, time, values))) / WHILE
     if changes.size < _FEWEST or not np.quantile(changes, _HARDEST) > 0.0:
         return "", ""
     hardest = float(np.quantile(changes, _HARDEST))
@@ -231,10 +239,7 @@ def _nearest(factor: float) -> str:
 
 def _ratio(speed: Values, other: Values) -> float:
     """What a speed has to be multiplied by to be the other one [m/s]; NaN where they differ."""
-    known = np.isfinite(other.time) & np.isfinite(other.values)
-    if np.count_nonzero(known) < _FEWEST:
-        return float("nan")
-    at = np.interp(speed.time, other.time[known], to_si(other.values[known], other.unit))
+    at = other.at(speed.time)
     both = np.isfinite(speed.time + speed.values) & (np.abs(speed.values) > 0.0)
     both &= np.abs(at) > SLOWEST
     if np.count_nonzero(both) < _FEWEST or np.ptp(speed.values[both]) == 0.0:

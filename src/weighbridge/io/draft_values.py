@@ -15,9 +15,10 @@ import numpy as np
 
 from weighbridge.constants import GRAVITY
 from weighbridge.io.draft_column import DraftColumn
-from weighbridge.io.draft_unit import VACUUM, Values, plausible_unit
+from weighbridge.io.draft_time import FASTEST
+from weighbridge.io.draft_unit import SLOWEST, TOGETHER, VACUUM, WHILE, Values, plausible_unit
 from weighbridge.io.naming import bare_quantities, means_another, words_of
-from weighbridge.signals import QUANTITIES, Floats
+from weighbridge.signals import QUANTITIES
 from weighbridge.signals.units import UNITS, to_si
 
 ON_BOARD: Final = 32.0
@@ -59,20 +60,11 @@ _DROPPED: Final = 0.02
 _EMPTY: Final = 0.5
 """Voltage of an empty battery under load over the usual one, at least [-]."""
 
-_SAG: Final = 0.6
-"""Correlation of the changes of a battery's voltage and current, at least [-]."""
-
-_STEP: Final = 3.0
-"""Time over which these changes are taken [s]."""
-
 _BRAKED: Final = 0.3
 """Deceleration that is none of a coasting vehicle [m/s^2]."""
 
 _FEWEST: Final = 20
 """Rows in which something is to be seen."""
-
-_SLOW: Final = 3.0
-"""Slower, gears and clutches hide how engine and vehicle go together [m/s]."""
 
 _TURNS: Final = 50.0
 """An engine turns faster while it drives the vehicle [rad/s]."""
@@ -92,9 +84,6 @@ _CHANGES: Final = 0.1
 _STEADY: Final = 0.02
 """Change of a speed over that of all rows which is no change [-]."""
 
-_FASTEST: Final = 4.0
-"""Mean size of a vehicle's acceleration, at most, as in `weighbridge.io.draft_time` [m/s^2]."""
-
 _SLOWEST: Final = 0.02
 """Mean size of its acceleration in either half of a drive, at least [m/s^2]."""
 
@@ -103,10 +92,6 @@ _SETTLED: Final = 0.25
 
 _TOP: Final = 95.0
 """Speed of a road vehicle, at most [m/s]."""
-
-_TOGETHER: Final = 0.6
-"""Correlation of engine and vehicle speed in a gear, and of air flow and engine speed, at least:
-gears are changed, and in overrun little air flows [-]."""
 
 
 def with_judged_values(
@@ -226,7 +211,7 @@ def _without_constants(columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, .
     """Take no constant, such as an engine's rated power, for what changes in a drive."""
     drives = any(
         c.quantity in ("vehicle_speed", "gnss_speed")
-        and (c.high - c.low) * UNITS[c.unit].factor > _SLOW
+        and (c.high - c.low) * UNITS[c.unit].factor > SLOWEST
         for c in columns
     )
     return tuple(
@@ -250,7 +235,7 @@ def _without_set_mass(
     speed = next((c for c in columns if c.quantity in ("vehicle_speed", "gnss_speed")), None)
     if speed is not None:
         with np.errstate(invalid="ignore"):
-            there &= _at(replace(reported[speed.name], unit=speed.unit), time) > _SLOW
+            there &= replace(reported[speed.name], unit=speed.unit).at(time) > SLOWEST
     time, mass = time[there], mass[there]
     if time.size < _FEWEST:
         return _nothing(column, "shows no mass of a vehicle while it moves")
@@ -336,7 +321,7 @@ def _alike(several: Sequence[Values]) -> bool:
     """Whether columns read alike, but for a delay."""
     first = several[0]
     for other in several[1:]:
-        at = _at(other, first.time)
+        at = other.at(first.time)
         here = to_si(first.values, first.unit)
         both = np.isfinite(here + at)
         if np.count_nonzero(both) < _FEWEST:
@@ -347,20 +332,10 @@ def _alike(several: Sequence[Values]) -> bool:
     return True
 
 
-def _at(values: Values, time: Floats) -> Floats:
-    """Return values in SI at other instants; NaN outside."""
-    there = np.isfinite(values.time) & np.isfinite(values.values)
-    if np.count_nonzero(there) < 2:
-        return np.full(time.size, np.nan)
-    order = np.argsort(values.time[there], kind="stable")
-    x, y = values.time[there][order], to_si(values.values[there][order], values.unit)
-    return np.asarray(np.interp(time, x, y, left=np.nan, right=np.nan))
-
-
 def _moves(values: Values, known: Mapping[str, Values]) -> bool:
     """Whether values change as the speed of a vehicle: often, and no faster than tyres allow."""
-    time, speed = _rising(values)
-    if speed.size < _FEWEST or speed.min() < -1.0 or speed.max() > _TOP or np.ptp(speed) < _SLOW:
+    time, speed = values.rising()
+    if speed.size < _FEWEST or speed.min() < -1.0 or speed.max() > _TOP or np.ptp(speed) < SLOWEST:
         return False
     swings = []
     for half in np.array_split(np.arange(time.size), 2):
@@ -371,7 +346,7 @@ def _moves(values: Values, known: Mapping[str, Values]) -> bool:
     return (
         min(swings) > _SLOWEST
         and not settled
-        and max(swings) < _FASTEST
+        and max(swings) < FASTEST
         and float(np.max(np.abs(np.diff(speed)))) < 0.5 * float(np.ptp(speed))
         and ("engine_speed" not in known or _in_gear(values, known["engine_speed"]))
     )
@@ -379,7 +354,7 @@ def _moves(values: Values, known: Mapping[str, Values]) -> bool:
 
 def _turns(values: Values, known: Mapping[str, Values]) -> bool:
     """Whether values turn as an engine does: with the vehicle, in one gear or several."""
-    _, turns = _rising(values)
+    _, turns = values.rising()
     if turns.size < _FEWEST or turns.max() < 2.0 * _TURNS or np.ptp(turns) < _TURNS:
         return False
     speed = known.get("vehicle_speed") or known.get("gnss_speed")
@@ -388,9 +363,9 @@ def _turns(values: Values, known: Mapping[str, Values]) -> bool:
 
 def _in_gear(speed: Values, engine: Values) -> bool:
     """Whether engine and vehicle speed rise and fall together, as in a gear."""
-    time, v = _rising(speed)
-    n = _at(engine, time)
-    moving = np.isfinite(n) & (v > _SLOW) & (n > _TURNS)
+    time, v = speed.rising()
+    n = engine.at(time)
+    moving = np.isfinite(n) & (v > SLOWEST) & (n > _TURNS)
     time, v, n = time[moving], v[moving], n[moving]
     if not time.size:
         return False
@@ -406,7 +381,7 @@ def _in_gear(speed: Values, engine: Values) -> bool:
             moves = np.ptp(b) > 0.0
             together.append(float(np.corrcoef(a, b)[0, 1]) if moves else 0.0)
         begin = end
-    return len(together) >= _WINDOWS and float(np.median(together)) > _TOGETHER
+    return len(together) >= _WINDOWS and float(np.median(together)) > TOGETHER
 
 
 def _breathes(values: Values, known: Mapping[str, Values]) -> bool:
@@ -414,20 +389,20 @@ def _breathes(values: Values, known: Mapping[str, Values]) -> bool:
     engine = known.get("engine_speed")
     if engine is None:
         return False
-    time, flow = _rising(values)
-    n = _at(engine, time)
+    time, flow = values.rising()
+    n = engine.at(time)
     both = np.isfinite(n)
     q = QUANTITIES["mass_air_flow"]
     if np.count_nonzero(both) < _FEWEST or flow.min() < 0.0 or flow.max() > q.high:
         return False
     if np.ptp(flow[both]) == 0.0 or np.ptp(n[both]) == 0.0:
         return False
-    return float(np.corrcoef(flow[both], n[both])[0, 1]) > _TOGETHER
+    return float(np.corrcoef(flow[both], n[both])[0, 1]) > TOGETHER
 
 
 def _feeds(values: Values, known: Mapping[str, Values]) -> bool:
     """Whether a voltage is that of a battery that drives the vehicle."""
-    _, volts = _rising(values)
+    _, volts = values.rising()
     q = QUANTITIES["battery_voltage"]
     if volts.size < _FEWEST or volts.max() > q.high:
         return False
@@ -440,15 +415,15 @@ def _sags(values: Values, known: Mapping[str, Values]) -> bool:
     battery = known.get("battery_voltage")
     if battery is None:
         return False
-    time, volts = _rising(battery)
-    amps, later = _at(values, time), np.searchsorted(time, time + _STEP)
+    time, volts = battery.rising()
+    amps, later = values.at(time), np.searchsorted(time, time + WHILE)
     first = np.flatnonzero(later < time.size)
     changes = [x[later[first]] - x[first] for x in (volts, amps)]
     both = np.isfinite(changes[0] + changes[1])
     a, b = (x[both] for x in changes)
     if a.size < _FEWEST or np.ptp(a) == 0.0 or np.ptp(b) == 0.0:
         return False
-    return bool(abs(np.corrcoef(a, b)[0, 1]) > _SAG)
+    return bool(abs(np.corrcoef(a, b)[0, 1]) > TOGETHER)
 
 
 def _brakes(values: Values, known: Mapping[str, Values]) -> bool:
@@ -457,18 +432,11 @@ def _brakes(values: Values, known: Mapping[str, Values]) -> bool:
     states = np.unique(values.values[np.isfinite(values.values)])
     if speed is None or states.size != 2 or states.tolist() != [0.0, 1.0]:
         return False
-    time, v = _rising(speed)
-    later = np.searchsorted(time, time + _STEP)
-    first = np.flatnonzero((later < time.size) & (v > _SLOW))
+    time, v = speed.rising()
+    later = np.searchsorted(time, time + WHILE)
+    first = np.flatnonzero((later < time.size) & (v > SLOWEST))
     slowing = (v[later[first]] - v[first]) / (time[later[first]] - time[first])
-    on = _at(values, time[first]) > 0.5
+    on = values.at(time[first]) > 0.5
     if min(np.count_nonzero(on), np.count_nonzero(~on)) < _FEWEST:
         return False
     return float(np.median(slowing[on])) < -_BRAKED < float(np.median(slowing[~on]))
-
-
-def _rising(values: Values) -> tuple[Floats, Floats]:
-    """Return instants in their order and values in SI."""
-    there = np.isfinite(values.time) & np.isfinite(values.values)
-    order = np.argsort(values.time[there], kind="stable")
-    return values.time[there][order], to_si(values.values[there][order], values.unit)

@@ -19,7 +19,7 @@ import polars as pl
 from weighbridge.errors import DriveError
 from weighbridge.io.channels import Recording
 from weighbridge.io.draft_time import DraftTime, find_times
-from weighbridge.io.long_csv import are_long, recording_of
+from weighbridge.io.long_csv import LOOKED_AT, are_long, recording_of
 from weighbridge.io.mapping import TimeColumn
 from weighbridge.io.table import MOST_COLUMNS, RawTable, column_list
 from weighbridge.io.tesla_fleet import records_of
@@ -30,9 +30,6 @@ _LIST: Final = re.compile(rb"\s*\[\s*\{")
 
 _DEEPEST: Final = 6
 """Objects within objects."""
-
-_LOOKED_AT: Final = 200
-"""Records by which it is known whether each holds one value."""
 
 
 def is_json_lines(head: bytes) -> bool:
@@ -72,7 +69,7 @@ def open_json_lines(path: Path, time: TimeColumn) -> Recording:
         schema={str(k): pl.String for k in range(len(names))},
     )
     raw = RawTable(path, tuple(names), frame, notes=lines.problems("file.lines_left_out", path))
-    sample = [[row.get(name, "") for name in names] for row in rows[:_LOOKED_AT]]
+    sample = [[row.get(name, "") for name in names] for row in rows[:LOOKED_AT]]
     return recording_of(raw, time) if are_long(names, sample) else _wide(raw, time)
 
 

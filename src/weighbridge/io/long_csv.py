@@ -50,7 +50,7 @@ _DAMAGED: Final = 0.005
 """Part of the rows that a word is in at most which a torn line left [-]."""
 
 # Rows by which it is known what a column of texts names, and part of the names that are known.
-_LOOKED_AT: Final = 200
+LOOKED_AT: Final = 200
 _KNOWN: Final = 0.5
 
 
@@ -190,7 +190,7 @@ def recording_of(raw: RawTable, time: TimeColumn) -> Recording:
 def _some(raw: RawTable) -> list[list[str]]:
     """Return the first rows of a table as texts."""
     columns = [
-        raw.column(k).head(_LOOKED_AT).cast(pl.String).fill_null("").str.strip_chars().to_list()
+        raw.column(k).head(LOOKED_AT).cast(pl.String).fill_null("").str.strip_chars().to_list()
         for k in range(len(raw.names))
     ]
     return [list(row) for row in zip(*columns, strict=True)]

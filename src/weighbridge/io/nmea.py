@@ -20,7 +20,7 @@ from weighbridge.errors import DriveError
 from weighbridge.io.libraries import importing
 from weighbridge.io.log import Log
 from weighbridge.io.mapping import TableMapping
-from weighbridge.io.table import unwrapped
+from weighbridge.io.table import DAY, unwrapped
 from weighbridge.io.understood import Lines
 from weighbridge.messages import phrase
 from weighbridge.signals import Floats, Problem
@@ -39,7 +39,6 @@ _WHOLE: Final = re.compile(
 """A line with a whole sentence, after what an app may write before it."""
 
 _OTHER: Final = re.compile(rb"\$[A-Z]{5,6},")
-_DAY: Final = 86_400.0
 
 # Quality 0 is no fix, 6 dead reckoning, 7 put in by hand, 8 simulated (NMEA 0183, GGA).
 _NO_FIX: Final = frozenset((0, 6, 7, 8))
@@ -242,7 +241,7 @@ def _day(message: Any) -> float:
     date = message.datestamp
     if not isinstance(date, dt.date):
         return math.nan
-    return (date - dt.date(1970, 1, 1)).days * _DAY
+    return (date - dt.date(1970, 1, 1)).days * DAY
 
 
 def _fixed(message: Any, kind: str) -> bool:
@@ -286,7 +285,7 @@ def _time(clock: Floats, day: Floats) -> tuple[Floats, bool]:
     last[: int(np.argmax(dated))] = int(np.argmax(dated))
     reported = day[last] + clock[last]
     time = day[last] + clock
-    return time + _DAY * np.round((reported - time) / _DAY), True
+    return time + DAY * np.round((reported - time) / DAY), True
 
 
 def _nothing(path: Path, data: bytes, lost: Counter[str]) -> str:

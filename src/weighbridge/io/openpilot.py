@@ -19,7 +19,7 @@ from typing import Any, Final
 import numpy as np
 
 from weighbridge.errors import DriveError
-from weighbridge.io.channels import Channel, Recording
+from weighbridge.io.channels import Channel, Recording, most_unpacked
 from weighbridge.io.frames import EXTENDED_MASK, Frames
 from weighbridge.io.libraries import importing
 from weighbridge.io.mapping import TimeColumn
@@ -30,9 +30,6 @@ from weighbridge.signals import Floats
 _BZIP2: Final = b"BZh"
 _ZSTANDARD: Final = b"\x28\xb5\x2f\xfd"
 _BLOCK: Final = 1 << 12
-
-# A segment is a minute, of 100 MB at most.
-_MOST_BYTES: Final = 1 << 30
 
 # More than the library itself takes.
 _MOST_SEGMENTS: Final = 512
@@ -170,7 +167,7 @@ def _decompressed(path: Path, data: bytes, opener: Callable[[], Any]) -> tuple[b
             parts.append(stream.decompress(data[at : at + _BLOCK]))
             at += _BLOCK
             size += len(parts[-1])
-            if size > _MOST_BYTES:
+            if size > most_unpacked(path):
                 raise DriveError(f"{path} unpacks to more than 1 GB; a segment is a minute")
             if stream.eof:
                 at = min(at, len(data)) - len(stream.unused_data)

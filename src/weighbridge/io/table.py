@@ -16,6 +16,7 @@ import polars as pl
 from weighbridge.errors import DriveError
 from weighbridge.io.quiet import PARSE_ERRORS, first_line, quietly
 from weighbridge.io.understood import (
+    LOOKED_AT,
     UTF_16,
     Lines,
     cells,
@@ -39,6 +40,9 @@ MOST_COLUMNS: Final = 10_000
 DATES: Final = (631_152_000.0, 4_102_444_800.0)
 """Numbers of seconds between these count from 1970: the years 1990 to 2100 [s]."""
 
+DAY: Final = 86_400.0
+"""Length of a day [s]."""
+
 _LONGEST_NAME: Final = 60
 """Letters of a column's name that a message shows."""
 
@@ -53,8 +57,7 @@ _NUMBER_UNIT: Final = (
 )
 """A number with a unit behind it."""
 
-# Rows by which a unit in the cells is known, and part of them that may have another one.
-_LOOKED_AT: Final = 1000
+# Part of the rows by which a unit in the cells is known that may have another one.
 _FEW: Final = 0.02
 
 # Above this part of cells that are not numbers, a column is text.
@@ -207,7 +210,7 @@ class RawTable:
         """Unit that is in the cells of a column, behind their numbers; empty for none."""
         if index in self.plain or self.column(index).dtype != pl.String:
             return ""
-        reported = _one_unit(self.column(index).head(_LOOKED_AT))
+        reported = _one_unit(self.column(index).head(LOOKED_AT))
         return reported[1] if reported is not None else ""
 
 
@@ -487,15 +490,14 @@ def seconds_of(series: pl.Series) -> tuple[Floats, bool]:
 
 def unwrapped(seconds: Floats) -> Floats:
     """Carry a time of day over midnight; a stamp that alone falls by half a day is damaged."""
-    day = 86_400.0
     finite = np.isfinite(seconds)
     present = seconds[finite]
     turns = np.zeros(present.size)
-    falls = np.flatnonzero(np.diff(present) < -day / 2) + 1
+    falls = np.flatnonzero(np.diff(present) < -DAY / 2) + 1
     for k in falls.tolist():
-        turns[k] = present[max(k - _AROUND, 0) : k].min() - present[k : k + _AROUND].max() > day / 2
+        turns[k] = present[max(k - _AROUND, 0) : k].min() - present[k : k + _AROUND].max() > DAY / 2
     out = seconds.copy()
-    out[finite] = present + day * np.cumsum(turns)
+    out[finite] = present + DAY * np.cumsum(turns)
     return out
 
 

@@ -22,8 +22,8 @@ Ints = NDArray[np.intp]
 _FEW: Final = 0.01
 """Part of the rows that end early, at most: above it the logger leaves last cells out [-]."""
 
-# Lines with more cells than names of which it is looked at what is in them.
-_LOOKED_AT: Final = 1000
+# Rows of a table of which it is looked at what is in them.
+LOOKED_AT: Final = 1000
 
 
 UTF_16: Final = (b"\xff\xfe", b"\xfe\xff")
@@ -138,7 +138,7 @@ def strange_rows(data: bytes, columns: int, separator: str) -> tuple[int, int, i
         of the first line among these, 0 for none
     """
     rows = _Rows(data, columns, separator)
-    looked = rows.long[:_LOOKED_AT]
+    looked = rows.long[:LOOKED_AT]
     beyond = rows.beyond(looked)
     share = np.count_nonzero(beyond) / max(beyond.size, 1)
     strange = [*np.flatnonzero(rows.lone).tolist(), *looked[beyond].tolist()]

@@ -21,7 +21,7 @@ import polars as pl
 from weighbridge.errors import DriveError
 from weighbridge.io.log import Log
 from weighbridge.io.mapping import MappedSignal, TableMapping, lacking, resolved_unit
-from weighbridge.io.table import column_list, unwrapped
+from weighbridge.io.table import DAY, column_list, unwrapped
 from weighbridge.io.understood import Lines, number_of, text_of
 from weighbridge.io.way import way_ratio
 from weighbridge.signals import Bools, Floats, Problem
@@ -35,7 +35,6 @@ _SPEED_UNITS: Final = {
     "kmh": "kmh", "km/h": "kmh", "kph": "kmh", "knots": "kn", "kts": "kn", "mph": "mph",
     "m/s": "mps", "ms": "mps",
 }  # fmt: skip
-_DAY: Final = 86_400.0
 _BRAKE: Final = 64
 
 _PLACES: Final = ("lat", "long")
@@ -262,7 +261,7 @@ def _dated(time: Floats, head: str) -> tuple[Floats, bool]:
     hour, minute = (int(g) if g is not None else 12 for g in found.groups()[3:])
     created = midnight + 3600.0 * hour + 60.0 * minute
     first = midnight + float(finite[0])
-    return time + midnight + _DAY * round((created - first) / _DAY), True
+    return time + midnight + DAY * round((created - first) / DAY), True
 
 
 def _speed_unit(log: Log, titles: list[str], names: list[str], mapping: TableMapping | None) -> str:
