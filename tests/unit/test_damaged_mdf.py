@@ -306,6 +306,23 @@ def test_records_beyond_the_data_take_no_memory(tmp_path, cycles, length):
     assert peak < 1 << 25
 
 
+@pytest.mark.parametrize("layout", ["sorted", "lists", "unsorted"])
+def test_counters_beyond_the_data_take_no_memory(tmp_path, layout):
+    raw = bytearray(log(layout))
+    struct.pack_into("<Q", raw, body(raw, b"##CG") + 8, 1 << 33)
+    # What reading imports is no memory of the file.
+    read_drive(written(tmp_path))
+    path = tmp_path / "log.mf4"
+    path.write_bytes(raw)
+    tracemalloc.start()
+    drive = read_drive(path)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 1 << 25
+    assert has(drive.problems[:1], "file.ends_short")
+    assert_allclose(drive.signals["vehicle_speed"].values, SPEEDS / 3.6)
+
+
 def test_identifier_that_is_no_number(tmp_path):
     raw = bytearray(log("sorted"))
     # The third channel; its data type becomes bytes.

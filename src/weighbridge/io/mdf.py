@@ -30,7 +30,7 @@ from weighbridge.io.labels import physical_of
 from weighbridge.io.libraries import importing, reason_of, unreadable
 from weighbridge.io.log import Log
 from weighbridge.io.mapping import TableMapping, UnnamedError
-from weighbridge.io.mdf_repair import Repaired, corrected, guard, settle
+from weighbridge.io.mdf_repair import Repaired, corrected, guard
 from weighbridge.messages import phrase
 from weighbridge.signals import DriveInfo, Floats, Problem
 
@@ -168,7 +168,8 @@ def _open(opener: Any, path: Path, saved: Repaired | None, folder: str) -> tuple
                 # Frames are sorted by identifier there, which takes long and is not used here.
                 process_bus_logging=False,
             )
-            return file, settle(file)
+            groups = (g.channel_group for g in file.groups if g.channels)
+            return file, sum(int(group.cycles_nr) for group in groups)
     # The library's errors are of many kinds, down to struct.error.
     except Exception as e:
         reason = reason_of(e)

@@ -245,7 +245,7 @@ class _File:
         if self.flags:
             return
         if whole and all(sound for *_, sound in strings):
-            if not id_size and held < reported:
+            if held < reported:
                 self.copy()
             self.exact &= bool(id_size) or (
                 held == reported and all(self.plain(part)[1] for part in parts)
@@ -408,22 +408,6 @@ def _check_three(raw: mmap.mmap) -> None:
             raise ValueError(
                 f"{reported} bytes of data from byte {data} on are more than there are"
             )
-
-
-def settle(file: Any) -> int:
-    """Let no group of an open file have more records than its data can hold; return how many.
-
-    asammdf takes memory for as many as the group reports.
-    """
-    for group in file.groups:
-        reported = group.channel_group
-        # Lists of columns hold the invalidation bits apart; MDF 3 has none.
-        apart = getattr(group, "uses_ld", False)
-        invalid = 0 if apart else int(getattr(reported, "invalidation_bytes_nr", 0))
-        if reported.cycles_nr and (size := int(reported.samples_byte_nr) + invalid):
-            held = sum(int(b.original_size) for b in group.get_data_blocks())
-            reported.cycles_nr = min(int(reported.cycles_nr), held // size)
-    return sum(int(g.channel_group.cycles_nr) for g in file.groups if g.channels)
 
 
 def guard() -> None:
