@@ -101,6 +101,26 @@ def test_channels_of_an_mdf_are_drafted(tmp_path):
     np.testing.assert_allclose(speed.values, (20.0 + time) / 3.6)
 
 
+def test_channels_of_an_mdf_that_are_not_known_are_reported_and_not_read(tmp_path):
+    asammdf = pytest.importorskip("asammdf")
+    time = np.arange(0.0, 30.0, 0.1)
+    path = tmp_path / "trip.mf4"
+    with asammdf.MDF() as file:
+        for length in (200, 300):
+            speed = (20.0 + time)[:length]
+            file.append([asammdf.Signal(speed, time[:length], name="vehicle_speed", unit="km/h")])
+        file.append([asammdf.Signal(time, time, name="Foo")])
+        file.append([asammdf.Signal(time, time, name="track.grade_rad")])
+        file.save(path)
+    drive = read_drive(path)
+    assert drive.signals.keys() == {"vehicle_speed"}
+    assert len(drive.signals["vehicle_speed"]) == 300
+    told = {p.id: p.values for p in drive.problems}
+    assert told["file.unknown"]["columns"] == "'Foo', 'track.grade_rad'"
+    assert told["file.channel_twice"]["count"] == 2
+    assert drive.units == {"vehicle_speed": "kmh"}
+
+
 @pytest.fixture
 def named(logged, tmp_path):
     """A mapping in a folder of its own that names the DBC beside the log."""

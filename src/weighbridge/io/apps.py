@@ -24,7 +24,6 @@ whether gravity is in them, are not documented.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, Final
 
@@ -35,31 +34,12 @@ from weighbridge.io.columns import bracketed_unit, dimension_of, unit_suffix
 from weighbridge.io.log import Log
 from weighbridge.io.mapping import MappedSignal, TableMapping, TimeColumn
 from weighbridge.io.table import RawTable, TextFormat, column_list, read_text
-from weighbridge.io.tabular import read_mapped
+from weighbridge.io.tabular import read_mapped, taken
 from weighbridge.io.understood import plain_head, text_of
 from weighbridge.signals import QUANTITIES, Floats, Problem
-from weighbridge.signals.cleaning import clean_columns
-from weighbridge.signals.units import UNITS, to_si
+from weighbridge.signals.units import UNITS
 
-_Column = tuple[str, int, str]
-"""Quantity, place of its column, and suffix of its unit."""
-
-
-def _columns(log: Log, raw: RawTable, wanted: Iterable[_Column]) -> dict[str, Floats]:
-    """Read columns in SI, by quantity; what is odd of them is reported."""
-    log.problems += [note.at(log.path.name) for note in raw.notes]
-    found = {}
-    for quantity, place, suffix in wanted:
-        values, notes = raw.numbers(place)
-        log.problems += [note.at(log.path.name, quantity) for note in notes]
-        found[quantity] = to_si(values, suffix)
-    return found
-
-
-def _cleaned(log: Log, time: Floats, columns: dict[str, Floats]) -> Log:
-    log.signals, problems = clean_columns(time, list(columns.items()), log.path.name)
-    log.problems += problems
-    return log
+_Column = tuple[int, str, MappedSignal | None]
 
 
 def _unknown(raw: RawTable) -> DriveError:
@@ -120,11 +100,11 @@ def read_racechrono(path: Path, table: str | None, mapping: TableMapping | None)
         if not quantity or quantity in wanted:
             ignored.append(f"{name} ({kind})" if kind else name)
         elif (suffix := unit_suffix(units[k])) is not None and _fits(quantity, suffix):
-            wanted[quantity] = (quantity, k, suffix)
+            wanted[quantity] = (k, suffix, None)
         else:
             about: dict[str, Any] = {"file": path.name, "name": name, "unit": units[k]}
             odd.append(Problem.of("file.unknown_unit", quantity, **about))
-    columns = _columns(log, raw, wanted.values())
+    columns = taken(log, raw, wanted)
     if not columns:
         raise _unknown(raw)
     log.problems += odd
@@ -132,7 +112,8 @@ def read_racechrono(path: Path, table: str | None, mapping: TableMapping | None)
         log.problems.append(
             Problem.of("file.ignored", file=path.name, columns=column_list(ignored))
         )
-    return _cleaned(log, raw.numbers(0)[0], columns)
+    log.take(raw.numbers(0)[0], columns)
+    return log
 
 
 def _fits(quantity: str, unit: str | None) -> bool:
@@ -242,12 +223,11 @@ def read_sensor_logger(path: Path, table: str | None, mapping: TableMapping | No
         return log
     raw = read_text(path, TextFormat(separator=","))
     places = ((quantity, raw.index(name), unit) for name, quantity, unit, _ in known)
-    columns = _columns(log, raw, [(q, k, unit) for q, k, unit in places if k is not None])
-    for _, quantity, _, positive in known:
-        if positive and quantity in columns:
-            columns[quantity] = np.where(columns[quantity] < 0.0, np.nan, columns[quantity])
-    columns = {q: values for q, values in columns.items() if np.isfinite(values).any()}
-    return _cleaned(log, raw.numbers(0)[0] * 1e-9, columns)
+    columns = taken(log, raw, {q: (k, unit, None) for q, k, unit in places if k is not None})
+    signed = {quantity for _, quantity, _, positive in known if not positive}
+    columns = [(q, v if q in signed else np.where(v < 0.0, np.nan, v)) for q, v in columns]
+    log.take(raw.numbers(0)[0] * 1e-9, [(q, v) for q, v in columns if np.isfinite(v).any()])
+    return log
 
 
 # Tesla Track Mode ---------------------------------------------------------------------------------
@@ -280,7 +260,7 @@ def read_track_mode(path: Path, table: str | None, mapping: TableMapping | None)
     raw = read_text(path, TextFormat(separator=","))
     log = Log(path)
     known = ((_TRACK_MODE.get(name.strip().lower()), k) for k, name in enumerate(raw.names))
-    columns = _columns(log, raw, [(entry[0], k, entry[1]) for entry, k in known if entry])
+    columns = dict(taken(log, raw, {e[0]: (k, e[1], None) for e, k in known if e}))
     if not columns:
         raise _unknown(raw)
     place = ("latitude", "longitude")
@@ -289,7 +269,8 @@ def read_track_mode(path: Path, table: str | None, mapping: TableMapping | None)
         nowhere = (columns["latitude"] == 0.0) & (columns["longitude"] == 0.0)
         columns |= {name: np.where(nowhere, np.nan, columns[name]) for name in place}
     laps, elapsed = (raw.numbers(raw.names.index(name))[0] for name in (_LAP, _TIME))
-    return _cleaned(log, _session_time(laps, elapsed * 1e-3), columns)
+    log.take(_session_time(laps, elapsed * 1e-3), list(columns.items()))
+    return log
 
 
 def _session_time(laps: Floats, elapsed: Floats) -> Floats:

@@ -24,7 +24,7 @@ from weighbridge.io.columns import (
     unit_suffix,
 )
 from weighbridge.io.draft import Draft, draft_column
-from weighbridge.io.draft_column import DraftColumn, checked, usual_rate
+from weighbridge.io.draft_column import Columns, DraftColumn, checked, usual_rate
 from weighbridge.io.draft_time import guessed_time_unit, text_time_format
 from weighbridge.io.draft_unit import Values, unit_in_name, with_judged_units
 from weighbridge.io.draft_values import with_judged_values
@@ -35,15 +35,15 @@ from weighbridge.io.mapping import (
     TableMapping,
     TimeColumn,
     UnnamedError,
+    in_si,
     lacking,
     resolved_unit,
 )
 from weighbridge.io.naming import recognise_all, unit_of
 from weighbridge.io.table import RawTable, column_list, time_seconds, unwrapped
 from weighbridge.signals import Floats, Problem
-from weighbridge.signals.cleaning import clean_columns
 from weighbridge.signals.tomlfile import Faults
-from weighbridge.signals.units import UNITS, to_si
+from weighbridge.signals.units import UNITS
 
 # Last parts of a name that say nothing of the quantity without the part before.
 _EMPTY_NAMES: Final = frozenset(
@@ -260,19 +260,15 @@ def log_of(path: Path, found: Recording, table: str | None, mapping: TableMappin
         if values.size < channel.time.size:
             log.problems.append(Problem.of("file.no_number", name, file=path.name))
             continue
-        if signal is not None and (signal.factor != 1.0 or signal.offset != 0.0):
-            values = values * signal.factor + signal.offset
         time, columns = clocks.setdefault(id(channel.time), (channel.time, []))
-        columns.append((name, to_si(values, suffix) if suffix else values))
+        columns.append((name, in_si(values, suffix, signal)))
         log.units[name] = suffix
     for time, columns in clocks.values():
         if time.size == 0:
             names = ", ".join(n for n, _ in columns)
             log.problems.append(Problem.of("file.no_samples", file=path.name, names=names))
             continue
-        signals, problems = clean_columns(time + offset if offset else time, columns, path.name)
-        log.signals += signals
-        log.problems += problems
+        log.take(time + offset if offset else time, columns)
     return log
 
 
@@ -346,7 +342,7 @@ def _reported(name: str) -> str:
     return parts[-1]
 
 
-def _judged(channels: list[Channel], columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, ...]:
+def _judged(channels: list[Channel], columns: Columns) -> Columns:
     """Judge columns by the values of all channels."""
     reported = {c.name: Values(c.time, c.values, unit_in_name(c.name, c.unit)) for c in channels}
     # What the format itself knows is compared too.

@@ -21,7 +21,7 @@ from weighbridge.io.columns import (
     stated_unit,
     unit_refused,
 )
-from weighbridge.io.draft_column import DraftColumn, checked, is_calculated, usual_rate
+from weighbridge.io.draft_column import Columns, DraftColumn, checked, is_calculated, usual_rate
 from weighbridge.io.draft_text import text_format
 from weighbridge.io.draft_time import DraftTime, by_motion, find_times, is_number, swings
 from weighbridge.io.draft_unit import Values, plausible_unit, unit_in_name, with_judged_units
@@ -87,7 +87,7 @@ class Draft:
     time_unit: str
     time_format: str
     duration: float
-    columns: tuple[DraftColumn, ...]
+    columns: Columns
     questions: tuple[str, ...] = ()
     alike: tuple[Path, ...] = ()
     row_rate: float | None = None
@@ -111,7 +111,7 @@ class Draft:
         return self.row_rate is not None and not self.row_rate > 0.0
 
     @property
-    def known(self) -> tuple[DraftColumn, ...]:
+    def known(self) -> Columns:
         """Columns that are some quantity."""
         return tuple(c for c in self.columns if c.quantity)
 
@@ -198,7 +198,7 @@ def draft(path: Path, names: Sequence[str] = ()) -> Draft:
     return timed(found, time)
 
 
-def _once(columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, ...]:
+def _once(columns: Columns) -> Columns:
     """Take no column for a quantity by its size that another one is by its name."""
     surest = {c.quantity: c for c in sorted(columns, key=lambda c: not c.unsure) if c.quantity}
     return tuple(
@@ -231,10 +231,14 @@ def _swings(raw: RawTable, columns: Sequence[DraftColumn]) -> float:
     return 0.0
 
 
+def known_quantities(drafts: Sequence[Draft]) -> frozenset[str]:
+    """Quantities that the logs of some drafts have, by a mapping or without one."""
+    return frozenset().union(*({c.quantity for c in d.known} | d.read_anyway for d in drafts))
+
+
 def tells_torque(*drafts: Draft) -> bool:
     """Whether what is known of the logs holds a torque, a load or what does instead."""
-    known = {c.quantity for one in drafts for c in one.known}
-    known |= frozenset().union(*(one.read_anyway for one in drafts))
+    known = known_quantities(drafts)
     sets = (s for source in TORQUE_SOURCES.values() for s in (source.signals, *source.others))
     return any(set(signals) - _BESIDE <= known for signals in sets)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Final
+from typing import Final, TypeAlias
 
 import numpy as np
 
@@ -66,6 +66,10 @@ class DraftColumn:
     rate: float = float("nan")
 
 
+Columns: TypeAlias = tuple[DraftColumn, ...]
+"""Of one log."""
+
+
 def usual_rate(time: Floats) -> float:
     """Values per second, in the median [Hz]; NaN where fewer than two instants are known.
 
@@ -79,13 +83,13 @@ def usual_rate(time: Floats) -> float:
     return round(1.0 / float(np.median(ahead)), 9) if ahead.size else float("nan")
 
 
-def checked(columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, ...]:
+def checked(columns: Columns) -> Columns:
     """Say what the columns of one log report each other's units."""
     columns = gyro_checked(gravity_checked(position_checked(columns)))
     return speed_checked(retarder_checked(percent_checked(columns)))
 
 
-def gyro_checked(columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, ...]:
+def gyro_checked(columns: Columns) -> Columns:
     """Give the axes of a gyroscope one unit: a stated one, else that of the largest values."""
     axes = [c for c in columns if c.quantity.startswith("gyro_")]
     reported = max(axes, key=lambda c: (c.stated, max(abs(c.low), abs(c.high))), default=None)
@@ -100,7 +104,7 @@ def gyro_checked(columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, ...]:
     )
 
 
-def position_checked(columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, ...]:
+def position_checked(columns: Columns) -> Columns:
     """Give both coordinates one unit. They are in radians if they would lie at sea in degrees:
     there is no land within 1.57 degrees of the equator and 3.15 degrees of Greenwich.
     """
@@ -122,7 +126,7 @@ def position_checked(columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, ...
     )
 
 
-def speed_checked(columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, ...]:
+def speed_checked(columns: Columns) -> Columns:
     """Question whose the one speed of a table of car and position is, if its name does not show."""
     tables = {QUANTITIES[c.quantity].table for c in columns if c.quantity not in ("", *_SPEEDS)}
     if not {"obd", "gnss"} <= tables:
@@ -139,7 +143,7 @@ def speed_checked(columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, ...]:
     )
 
 
-def gravity_checked(columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, ...]:
+def gravity_checked(columns: Columns) -> Columns:
     """Distinguish m/s^2 from g by gravity where the log states no unit; find it missing."""
     axes = [c for c in columns if c.quantity.startswith("accel_")]
     if len(axes) < 3:
@@ -162,7 +166,7 @@ def gravity_checked(columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, ...]
     )
 
 
-def retarder_checked(columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, ...]:
+def retarder_checked(columns: Columns) -> Columns:
     """Question a retarder's torque that counts braking positive: SPN 520 counts it negative."""
     question = "counts braking positive, SPN 520 negative: add factor = -1, or leave it out"
     return tuple(
@@ -173,7 +177,7 @@ def retarder_checked(columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, ...
     )
 
 
-def percent_checked(columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, ...]:
+def percent_checked(columns: Columns) -> Columns:
     """Distinguish a torque in percent from one in N m where the log states no unit of it.
 
     A reference torque beside it is what it is a part of, and it stays within what percents are.

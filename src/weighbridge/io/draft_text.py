@@ -60,17 +60,14 @@ def text_format(path: Path, columns: Sequence[str] = ()) -> tuple[TextFormat, di
             "again with other line ends"
         )
     separator = separator_of(lines)
-    rows = [cells(line, separator) for line in lines]
-    width = usual_width(rows)
-    begin = first_values(rows, width)
+    rows, width, begin = laid_out(lines, separator)
     if begin == len(rows) and len(found) >= HEAD_LINES and not columns:
         longer = head(path, _LONG_HEAD)
-        wide = [cells(line, separator_of(longer[HEAD_LINES:])) for line in longer if _filled(line)]
-        if len(longer) > HEAD_LINES and first_values(wide, usual_width(wide)) < len(wide):
-            found, rows, width = longer, wide, usual_width(wide)
-            lines = [line for line in longer if _filled(line)]
-            separator = separator_of(longer[HEAD_LINES:])
-            begin = first_values(rows, width)
+        more = [line for line in longer if _filled(line)]
+        parted = separator_of(longer[HEAD_LINES:]) if len(longer) > HEAD_LINES else separator
+        wide = laid_out(more, parted)
+        if wide[2] < len(more):
+            found, lines, separator, (rows, width, begin) = longer, more, parted, wide
     first = next((k for k, r in enumerate(rows) if abs(len(r) - width) <= 1 and width > 1), None)
     if first is None:
         raise DriveError(f"{path} is no table: its lines have no common separator")
@@ -113,16 +110,18 @@ def _filled(line: str) -> bool:
     return bool(line.strip(f"{''.join(SEPARATORS)} \t"))
 
 
-def usual_width(rows: Sequence[Sequence[str]]) -> int:
-    """Cells of the rows of the lower half."""
-    return int(np.median([len(r) for r in rows[-max(len(rows) // 2, 1) :]]))
+def laid_out(lines: Sequence[str], separator: str) -> tuple[list[list[str]], int, int]:
+    """Part lines into cells.
 
-
-def first_values(rows: Sequence[Sequence[str]], width: int) -> int:
-    """Place of the first of the rows of values that go on to the end; the end where there are none.
-
-    Lines of another form between them part nothing.
+    Returns
+    -------
+    rows : cells of each line
+    width : cells of the rows of the lower half
+    begin : place of the first of the rows of values that go on to the end, lines of another form
+        between them apart; the end where there are none
     """
+    rows = [cells(line, separator) for line in lines]
+    width = int(np.median([len(r) for r in rows[-max(len(rows) // 2, 1) :]]))
     begin = len(rows)
     for k in range(len(rows) - 1, -1, -1):
         fits = abs(len(rows[k]) - width) <= 1 and width > 1
@@ -130,7 +129,7 @@ def first_values(rows: Sequence[Sequence[str]], width: int) -> int:
             begin = k
         elif fits and sum(map(bool, rows[k])) > 0.5 * width:
             break
-    return begin
+    return rows, width, begin
 
 
 def _names_above(

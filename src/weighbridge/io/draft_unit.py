@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Final, TypeAlias
 
 import numpy as np
 
 from weighbridge.io.columns import suffixes_of, unit_suffix
-from weighbridge.io.draft_column import DraftColumn
+from weighbridge.io.draft_column import Columns
 from weighbridge.io.naming import unit_of
 from weighbridge.io.way import way_ratio
 from weighbridge.signals import QUANTITIES, Floats
@@ -97,15 +97,17 @@ class Values:
         return np.asarray(np.interp(time, x, y, left=np.nan, right=np.nan))
 
 
+Reported: TypeAlias = Mapping[str, Values]
+"""What a log holds in numbers, by its names; columns that are nothing to a drive too."""
+
+
 def unit_in_name(name: str, stated: str | None) -> str:
     """Suffix of the unit that a log states of a column; empty for none."""
     suffix = unit_of(name)[0] or (unit_suffix(stated) if stated else None) or stated or ""
     return suffix if suffix in UNITS else ""
 
 
-def with_judged_units(
-    columns: tuple[DraftColumn, ...], reported: Mapping[str, Values]
-) -> tuple[DraftColumn, ...]:
+def with_judged_units(columns: Columns, reported: Reported) -> Columns:
     """Give the speeds without a stated unit the one that their values and others show.
 
     Parameters
@@ -135,9 +137,7 @@ def with_judged_units(
     return _with_judged_turns(_with_judged_accelerations(tuple(judged), reported), reported)
 
 
-def _with_judged_turns(
-    columns: tuple[DraftColumn, ...], reported: Mapping[str, Values]
-) -> tuple[DraftColumn, ...]:
+def _with_judged_turns(columns: Columns, reported: Reported) -> Columns:
     """Give an engine's speed without a stated unit the one that the vehicle's speed shows."""
     speed = next((c for c in columns if c.quantity in ("vehicle_speed", "gnss_speed")), None)
     engine = next((c for c in columns if c.quantity == "engine_speed" and not c.stated), None)
@@ -154,9 +154,7 @@ def _with_judged_turns(
     return tuple(found if c is engine else c for c in columns)
 
 
-def _with_judged_accelerations(
-    columns: tuple[DraftColumn, ...], reported: Mapping[str, Values]
-) -> tuple[DraftColumn, ...]:
+def _with_judged_accelerations(columns: Columns, reported: Reported) -> Columns:
     """Give accelerations without a stated unit the one in which one of them is how the speed
     changes; three axes show theirs by gravity.
     """
@@ -200,7 +198,7 @@ def _gain(speed: Values, accel: Values) -> tuple[float, float]:
 
 
 def _judged(
-    speed: Values, fixes: Sequence[tuple[Floats, Floats]] | None, others: Mapping[str, Values]
+    speed: Values, fixes: Sequence[tuple[Floats, Floats]] | None, others: Reported
 ) -> tuple[str, str]:
     """Unit of a speed and what shows it; empty where nothing does."""
     if fixes is not None:

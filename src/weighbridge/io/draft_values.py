@@ -7,16 +7,24 @@ shows what a name does not.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
 from weighbridge.constants import GRAVITY
-from weighbridge.io.draft_column import DraftColumn
+from weighbridge.io.draft_column import Columns, DraftColumn
 from weighbridge.io.draft_time import FASTEST
-from weighbridge.io.draft_unit import SLOWEST, TOGETHER, VACUUM, WHILE, Values, plausible_unit
+from weighbridge.io.draft_unit import (
+    SLOWEST,
+    TOGETHER,
+    VACUUM,
+    WHILE,
+    Reported,
+    Values,
+    plausible_unit,
+)
 from weighbridge.io.naming import bare_quantities, means_another, words_of
 from weighbridge.signals import QUANTITIES
 from weighbridge.signals.units import UNITS, to_si
@@ -94,9 +102,7 @@ _TOP: Final = 95.0
 """Speed of a road vehicle, at most [m/s]."""
 
 
-def with_judged_values(
-    columns: tuple[DraftColumn, ...], reported: Mapping[str, Values]
-) -> tuple[DraftColumn, ...]:
+def with_judged_values(columns: Columns, reported: Reported) -> Columns:
     """Judge what columns are taken for by their values, and find what names do not show.
 
     Parameters
@@ -118,7 +124,7 @@ def with_judged_values(
     return columns
 
 
-def _on_board(columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, ...]:
+def _on_board(columns: Columns) -> Columns:
     """Take a battery that feeds control units for what it is, and its current for nothing."""
     volts = {
         c.name: c.usual * UNITS[c.unit].factor
@@ -150,7 +156,7 @@ def _on_board(columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, ...]:
     return tuple(found)
 
 
-def _without_gauge(column: DraftColumn, reported: Mapping[str, Values]) -> DraftColumn:
+def _without_gauge(column: DraftColumn, reported: Reported) -> DraftColumn:
     """Take no pressure over that of the air, and no number, for the pressure of the manifold."""
     if column.quantity != "intake_pressure" or column.name not in reported:
         return column
@@ -164,9 +170,7 @@ def _without_gauge(column: DraftColumn, reported: Mapping[str, Values]) -> Draft
     return _nothing(column, f"goes below {VACUUM / 1000.0:.0f} kPa, to which no engine pulls down")
 
 
-def _without_levels(
-    columns: tuple[DraftColumn, ...], reported: Mapping[str, Values]
-) -> tuple[DraftColumn, ...]:
+def _without_levels(columns: Columns, reported: Reported) -> Columns:
     """Take no pressure and no position of a pedal for its switch."""
     found = []
     for c in columns:
@@ -178,9 +182,7 @@ def _without_levels(
     return tuple(found)
 
 
-def _with_gravity(
-    columns: tuple[DraftColumn, ...], reported: Mapping[str, Values]
-) -> tuple[DraftColumn, ...]:
+def _with_gravity(columns: Columns, reported: Reported) -> Columns:
     """Take three columns that gravity is in for a sensor's: ROS calls them linear, others G-X."""
     axes = [
         next((c for c in columns if not c.quantity and q in bare_quantities(c.name)), None)
@@ -207,7 +209,7 @@ def _with_gravity(
     )
 
 
-def _without_constants(columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, ...]:
+def _without_constants(columns: Columns) -> Columns:
     """Take no constant, such as an engine's rated power, for what changes in a drive."""
     drives = any(
         c.quantity in ("vehicle_speed", "gnss_speed")
@@ -222,9 +224,7 @@ def _without_constants(columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, .
     )
 
 
-def _without_set_mass(
-    column: DraftColumn, columns: tuple[DraftColumn, ...], reported: Mapping[str, Values]
-) -> DraftColumn:
+def _without_set_mass(column: DraftColumn, columns: Columns, reported: Reported) -> DraftColumn:
     """Take no set-point, and nothing that changes as the drive goes, for the maker's mass."""
     if column.quantity != "maker_mass" or column.name not in reported:
         return column
@@ -256,11 +256,11 @@ def _nothing(column: DraftColumn, why: str) -> DraftColumn:
 
 
 def _found_by_values(
-    columns: tuple[DraftColumn, ...],
-    reported: Mapping[str, Values],
+    columns: Columns,
+    reported: Reported,
     quantity: str,
-    fits: Callable[[Values, Mapping[str, Values]], bool],
-) -> tuple[DraftColumn, ...]:
+    fits: Callable[[Values, Reported], bool],
+) -> Columns:
     """Take the one column whose values move as a quantity does, by its unit or a name that only
     says in what it is measured.
 
@@ -332,7 +332,7 @@ def _alike(several: Sequence[Values]) -> bool:
     return True
 
 
-def _moves(values: Values, known: Mapping[str, Values]) -> bool:
+def _moves(values: Values, known: Reported) -> bool:
     """Whether values change as the speed of a vehicle: often, and no faster than tyres allow."""
     time, speed = values.rising()
     if speed.size < _FEWEST or speed.min() < -1.0 or speed.max() > _TOP or np.ptp(speed) < SLOWEST:
@@ -352,7 +352,7 @@ def _moves(values: Values, known: Mapping[str, Values]) -> bool:
     )
 
 
-def _turns(values: Values, known: Mapping[str, Values]) -> bool:
+def _turns(values: Values, known: Reported) -> bool:
     """Whether values turn as an engine does: with the vehicle, in one gear or several."""
     _, turns = values.rising()
     if turns.size < _FEWEST or turns.max() < 2.0 * _TURNS or np.ptp(turns) < _TURNS:
@@ -384,7 +384,7 @@ def _in_gear(speed: Values, engine: Values) -> bool:
     return len(together) >= _WINDOWS and float(np.median(together)) > TOGETHER
 
 
-def _breathes(values: Values, known: Mapping[str, Values]) -> bool:
+def _breathes(values: Values, known: Reported) -> bool:
     """Whether values go with the engine's speed as the air does that it breathes."""
     engine = known.get("engine_speed")
     if engine is None:
@@ -400,7 +400,7 @@ def _breathes(values: Values, known: Mapping[str, Values]) -> bool:
     return float(np.corrcoef(flow[both], n[both])[0, 1]) > TOGETHER
 
 
-def _feeds(values: Values, known: Mapping[str, Values]) -> bool:
+def _feeds(values: Values, known: Reported) -> bool:
     """Whether a voltage is that of a battery that drives the vehicle."""
     _, volts = values.rising()
     q = QUANTITIES["battery_voltage"]
@@ -410,7 +410,7 @@ def _feeds(values: Values, known: Mapping[str, Values]) -> bool:
     return bool(usual >= ON_BOARD and lowest > _EMPTY * usual)
 
 
-def _sags(values: Values, known: Mapping[str, Values]) -> bool:
+def _sags(values: Values, known: Reported) -> bool:
     """Whether a battery's voltage falls and rises with a current, by its resistance."""
     battery = known.get("battery_voltage")
     if battery is None:
@@ -426,7 +426,7 @@ def _sags(values: Values, known: Mapping[str, Values]) -> bool:
     return bool(abs(np.corrcoef(a, b)[0, 1]) > TOGETHER)
 
 
-def _brakes(values: Values, known: Mapping[str, Values]) -> bool:
+def _brakes(values: Values, known: Reported) -> bool:
     """Whether the vehicle slows down while a switch is on, and not while it is off."""
     speed = known.get("vehicle_speed") or known.get("gnss_speed")
     states = np.unique(values.values[np.isfinite(values.values)])

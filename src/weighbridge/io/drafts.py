@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
-from weighbridge.io.draft import Draft
+from weighbridge.io.draft import Draft, known_quantities
 from weighbridge.io.draft_column import DraftColumn, gyro_checked
 from weighbridge.io.draft_unit import NEAR, SLOWEST, SPEEDS
 from weighbridge.io.file_patterns import file_patterns, undated
@@ -184,8 +184,7 @@ def missing(drafts: Sequence[Draft]) -> Iterator[str]:
     ----------
     drafts : of all files of a drive
     """
-    known = {c.quantity for one in drafts for c in one.known}
-    known |= frozenset().union(*(one.read_anyway for one in drafts))
+    known = known_quantities(drafts)
     left = [(one, c.name) for one in drafts for c in one.columns if not c.quantity]
     for sensor, words in words_in("sensors").items():
         quantities = _SENSORS[sensor]

@@ -13,11 +13,9 @@ import numpy as np
 from weighbridge.errors import DriveError
 from weighbridge.io.libraries import importing
 from weighbridge.io.log import Log
-from weighbridge.io.mapping import TableMapping
+from weighbridge.io.mapping import TableMapping, in_si
 from weighbridge.io.understood import Lines, text_of
 from weighbridge.signals import Problem
-from weighbridge.signals.cleaning import clean_columns
-from weighbridge.signals.units import to_si
 
 # Latitude, longitude and the like in the order of the columns below, with their units.
 _COLUMNS: Final = (
@@ -95,12 +93,11 @@ def read_gpx(path: Path, table: str | None, mapping: TableMapping | None) -> Log
     cells[np.abs(cells[:, 2]) > 180.0, 2] = math.nan
     time = cells[:, 0] + (mapping.time.offset if mapping else 0.0)
     columns = [
-        (name, to_si(cells[:, k], unit) if unit else cells[:, k])
+        (name, in_si(cells[:, k], unit))
         for k, (name, unit) in enumerate(_COLUMNS, start=1)
         if np.isfinite(cells[:, k]).any()
     ]
-    log.signals, problems = clean_columns(time, columns, path.name)
-    log.problems += problems
+    log.take(time, columns)
     return log
 
 

@@ -20,10 +20,9 @@ from weighbridge.io.columns import stated_unit, unit_suffix
 from weighbridge.io.draft_text import (
     HEAD_LINES,
     decimal_mark,
-    first_values,
+    laid_out,
     of_numbers,
     separator_of,
-    usual_width,
 )
 from weighbridge.io.draft_time import is_number, text_time_format
 from weighbridge.io.log import Log
@@ -31,7 +30,7 @@ from weighbridge.io.mapping import TableMapping, TimeColumn
 from weighbridge.io.naming import is_time, words_of
 from weighbridge.io.table import TextFormat, column_list, head, read_text
 from weighbridge.io.tabular import read_csv
-from weighbridge.io.understood import cells, plain_head
+from weighbridge.io.understood import plain_head
 from weighbridge.signals import Floats
 
 _STAMPS: Final = frozenset(("stamp", "marke", "marque", "marca", "merk"))
@@ -118,9 +117,7 @@ def _header(lines: Sequence[str]) -> _Header | None:
     if len(filled) < 3:
         return None
     separator = separator_of(filled)
-    rows = [cells(line, separator) for line in filled]
-    width = usual_width(rows)
-    begin = first_values(rows, width)
+    rows, width, begin = laid_out(filled, separator)
     if not 0 < begin < len(rows) - 1 or width < 4:
         return None
     at = [k for k, line in enumerate(lines) if line.strip()]

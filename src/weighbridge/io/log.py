@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from weighbridge.io.frames import Frames
 from weighbridge.io.mapping import TableMapping
-from weighbridge.signals import DriveInfo, Problem, Signal
+from weighbridge.signals import DriveInfo, Floats, Problem, Signal
+from weighbridge.signals.cleaning import clean_columns
 
 
 @dataclass(slots=True)
@@ -49,6 +50,12 @@ class Log:
     info: DriveInfo | None = None
     units: dict[str, str] = field(default_factory=dict)
     pieces: list[Log] = field(default_factory=list)
+
+    def take(self, time: Floats, columns: Sequence[tuple[str, Floats]]) -> None:
+        """Clean values in SI that share a clock, and add them as signals."""
+        signals, problems = clean_columns(time, columns, self.path.name)
+        self.signals += signals
+        self.problems += problems
 
     @property
     def span(self) -> tuple[float, float]:

@@ -50,9 +50,9 @@ from weighbridge.errors import ConfigError, DriveError
 from weighbridge.io.columns import bracketed_unit, dimension_of, suffixes_of, unit_suffix
 from weighbridge.io.dbc import dbc_path, seen_from
 from weighbridge.io.table import MOST_COLUMNS, TextFormat, column_list
-from weighbridge.signals import QUANTITIES, Problem, Quantity
+from weighbridge.signals import QUANTITIES, Floats, Problem, Quantity
 from weighbridge.signals.tomlfile import Faults, Section, read_toml
-from weighbridge.signals.units import UNITS
+from weighbridge.signals.units import UNITS, to_si
 
 FORMAT_VERSION: Final = 1
 """Version of the mapping file this program reads."""
@@ -436,6 +436,13 @@ def lacking(where: str, signal: MappedSignal, source: str, hint: str = "") -> Pr
         hint=hint,
         source=source,
     )
+
+
+def in_si(values: Floats, suffix: str, signal: MappedSignal | None = None) -> Floats:
+    """Values in SI of the unit that a suffix names, as a mapping scales them."""
+    if signal is not None and (signal.factor != 1.0 or signal.offset != 0.0):
+        values = values * signal.factor + signal.offset
+    return to_si(values, suffix) if suffix else values
 
 
 def resolved_unit(signal: MappedSignal, stated: str | None, source: str) -> str:

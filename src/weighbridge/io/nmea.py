@@ -24,7 +24,6 @@ from weighbridge.io.table import DAY, unwrapped
 from weighbridge.io.understood import Lines
 from weighbridge.messages import phrase
 from weighbridge.signals import Floats, Problem
-from weighbridge.signals.cleaning import clean_columns
 from weighbridge.signals.units import to_si
 
 # Longest sentence of the standard is 82 characters; receivers send longer ones of their own.
@@ -223,9 +222,7 @@ def _add(log: Log, rows: _Rows, units: tuple[str, ...], time: Floats) -> None:
         for k, (name, unit) in enumerate(zip(rows.names, units, strict=False))
         if np.isfinite(table[:, k]).any()
     ]
-    signals, problems = clean_columns(time[np.array(rows.stamps)], columns, log.path.name)
-    log.signals += signals
-    log.problems += problems
+    log.take(time[np.array(rows.stamps)], columns)
 
 
 def _clock(message: Any) -> float | None:

@@ -23,10 +23,9 @@ import numpy as np
 from weighbridge.errors import ConfigError, DriveError
 from weighbridge.io.libraries import parsing
 from weighbridge.io.log import Log
-from weighbridge.io.mapping import TableMapping, resolved_unit
+from weighbridge.io.mapping import TableMapping, in_si, resolved_unit
 from weighbridge.signals import Floats
-from weighbridge.signals.cleaning import clean_columns
-from weighbridge.signals.units import UNITS, to_si
+from weighbridge.signals.units import UNITS
 
 
 def read_npy(path: Path, table: str | None, mapping: TableMapping | None) -> Log:
@@ -74,11 +73,9 @@ def read_npy(path: Path, table: str | None, mapping: TableMapping | None) -> Log
     columns = []
     for s in mapping.signals:
         cells = _column(values, s.column, path, f"{source}: signals.{s.name} column")
-        cells = s.factor * cells + s.offset
-        suffix = resolved_unit(s, None, source)
-        columns.append((s.name, to_si(cells, suffix) if suffix else cells))
+        columns.append((s.name, in_si(cells, resolved_unit(s, None, source), s)))
     log = Log(path)
-    log.signals, log.problems = clean_columns(time, columns, path.name)
+    log.take(time, columns)
     return log
 
 

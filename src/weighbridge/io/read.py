@@ -409,10 +409,7 @@ def _share_clock(logs: Sequence[Log]) -> None:
     for log in logs:
         if log.absolute or log.start is None:
             continue
-        clocks: dict[int, Floats] = {}
-        for k, s in enumerate(log.signals):
-            clocks.setdefault(id(s.time), s.time + log.start)
-            log.signals[k] = Signal(s.name, clocks[id(s.time)], s.values)
+        shift_clock(log, log.start)
         if log.frames is not None:
             log.frames = replace(log.frames, time=log.frames.time + log.start)
         log.absolute = True

@@ -6,7 +6,7 @@ import difflib
 import json
 import re
 import shlex
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Final
@@ -24,7 +24,14 @@ from weighbridge.io.columns import (
 from weighbridge.io.draft_text import of_numbers
 from weighbridge.io.draft_time import counts_minutes, minutes_problem
 from weighbridge.io.log import Log
-from weighbridge.io.mapping import TableMapping, UnnamedError, lacking, resolved_unit
+from weighbridge.io.mapping import (
+    MappedSignal,
+    TableMapping,
+    UnnamedError,
+    in_si,
+    lacking,
+    resolved_unit,
+)
 from weighbridge.io.naming import recognise
 from weighbridge.io.parquet import read_parquet
 from weighbridge.io.table import (
@@ -36,10 +43,9 @@ from weighbridge.io.table import (
 )
 from weighbridge.signals import QUANTITIES, Floats, Problem
 from weighbridge.signals.catalogue import TIME_COLUMN
-from weighbridge.signals.cleaning import clean_columns
 from weighbridge.signals.parts import find_restarts
 from weighbridge.signals.tomlfile import Faults
-from weighbridge.signals.units import UNITS, to_si
+from weighbridge.signals.units import UNITS
 
 _PARTED: Final = re.compile(f"[{re.escape(''.join(SEPARATORS))}]")
 
@@ -70,9 +76,8 @@ def read_canonical(raw: RawTable, table: str | None) -> Log:
         There is no time, or no canonical column.
     """
     log = Log(raw.path)
-    log.problems += [note.at(raw.path.name) for note in raw.notes]
     time_index = next((i for i, n in enumerate(raw.names) if time_unit(n)), None)
-    wanted: dict[str, tuple[int, str]] = {}
+    wanted: dict[str, tuple[int, str, MappedSignal | None]] = {}
     unknown: list[str] = []
     for i, name in enumerate(raw.names):
         if i == time_index:
@@ -91,7 +96,7 @@ def read_canonical(raw: RawTable, table: str | None) -> Log:
                 )
             )
         else:
-            wanted[found[0].name] = (i, found[1])
+            wanted[found[0].name] = (i, found[1], None)
     if time_index is None:
         raise _no_time(raw, bool(wanted))
     if not wanted:
@@ -107,16 +112,32 @@ def read_canonical(raw: RawTable, table: str | None) -> Log:
     unit = UNITS[time_unit(raw.names[time_index]) or "s"]
     time, log.absolute, notes = time_seconds(raw, time_index, unit.factor, None)
     log.problems += [note.at(raw.path.name) for note in notes]
+    _finish(log, raw, time, taken(log, raw, wanted))
+    return log
+
+
+def taken(
+    log: Log, raw: RawTable, wanted: Mapping[str, tuple[int, str, MappedSignal | None]]
+) -> list[tuple[str, Floats]]:
+    """Read columns of a table in SI; what is odd of the table and of them is reported.
+
+    Parameters
+    ----------
+    log, raw : of the file
+    wanted : by quantity: place of its column, suffix of its unit, and how a mapping scales it
+    """
+    log.problems[:0] = [note.at(raw.path.name) for note in raw.notes]
     columns = []
-    for name, (i, suffix) in wanted.items():
-        values, notes = raw.numbers(i)
+    places = [place for place, _, _ in wanted.values()]
+    for name, (place, suffix, signal) in wanted.items():
+        values, notes = raw.numbers(place)
         log.problems += [note.at(raw.path.name, name) for note in notes]
-        columns.append((name, to_si(values, suffix) if suffix else values))
+        columns.append((name, in_si(values, suffix, signal)))
         log.units[name] = suffix
         del values
-        raw.release(i)
-    _finish(log, raw, time, columns)
-    return log
+        if places.count(place) == 1:
+            raw.release(place)
+    return columns
 
 
 def _table_of_all(raw: RawTable) -> str | None:
@@ -135,17 +156,19 @@ def read_mapped(raw: RawTable, mapping: TableMapping) -> Log:
         A unit is missing or impossible.
     """
     log = Log(raw.path)
-    log.problems += [note.at(raw.path.name) for note in raw.notes]
-    places = {}
+    wanted: dict[str, tuple[int, str, MappedSignal | None]] = {}
+    faults = Faults()
     for s in mapping.signals:
         index = raw.index(s.column)
         if index is not None:
-            places[s.name] = index
+            wanted[s.name] = (index, "", s)
+            with faults.gathered():
+                wanted[s.name] = (index, resolved_unit(s, None, mapping.source), s)
         elif not s.optional:
             log.lacking.append(
                 lacking(f"{raw.path.name}: column", s, mapping.source, _near(s.column, raw))
             )
-    if not places:
+    if not wanted:
         raise DriveError(
             f"{raw.path}: none of the columns named in {mapping.source} is there; "
             f"the file has {column_list(raw.names)}{_named_hint(raw)}"
@@ -154,21 +177,8 @@ def read_mapped(raw: RawTable, mapping: TableMapping) -> Log:
     if mapping.time.offset:
         time = time + mapping.time.offset
     log.problems += [note.at(raw.path.name) for note in notes]
-    columns = []
-    faults = Faults()
-    for s in mapping.signals:
-        if s.name not in places:
-            continue
-        values, notes = raw.numbers(places[s.name])
-        log.problems += [note.at(raw.path.name, s.name) for note in notes]
-        if s.factor != 1.0 or s.offset != 0.0:
-            values = values * s.factor + s.offset
-        with faults.gathered():
-            suffix = resolved_unit(s, None, mapping.source)
-            columns.append((s.name, to_si(values, suffix) if suffix else values))
-            log.units[s.name] = suffix
     faults.refuse()
-    _finish(log, raw, time, columns)
+    _finish(log, raw, time, taken(log, raw, wanted))
     return log
 
 
@@ -214,17 +224,12 @@ def _finish(log: Log, raw: RawTable, time: Floats, columns: list[tuple[str, Floa
     if raw.rows == 0:
         log.problems.append(Problem.of("file.no_rows", file=raw.path.name))
         return
-    reported = list(log.problems)
-    signals, problems = clean_columns(time, columns, raw.path.name)
-    log.signals += signals
-    log.problems += problems
     for rows in find_restarts(time):
-        signals, problems = clean_columns(
-            time[rows], [(name, values[rows]) for name, values in columns], raw.path.name
-        )
-        piece = Log(raw.path, signals, [*reported, *problems], list(log.lacking), log.absolute)
+        piece = Log(raw.path, [], list(log.problems), list(log.lacking), log.absolute)
         piece.units = log.units
+        piece.take(time[rows], [(name, values[rows]) for name, values in columns])
         log.pieces.append(piece)
+    log.take(time, columns)
 
 
 def _no_time(raw: RawTable, known: bool) -> DriveError:

@@ -20,12 +20,11 @@ import polars as pl
 
 from weighbridge.errors import DriveError
 from weighbridge.io.log import Log
-from weighbridge.io.mapping import MappedSignal, TableMapping, lacking, resolved_unit
+from weighbridge.io.mapping import MappedSignal, TableMapping, in_si, lacking, resolved_unit
 from weighbridge.io.table import DAY, column_list, unwrapped
 from weighbridge.io.understood import Lines, number_of, text_of
 from weighbridge.io.way import way_ratio
 from weighbridge.signals import Bools, Floats, Problem
-from weighbridge.signals.cleaning import clean_columns
 from weighbridge.signals.units import to_si
 
 _CREATED: Final = re.compile(
@@ -86,10 +85,9 @@ def read_vbo(path: Path, table: str | None, mapping: TableMapping | None) -> Log
     used = {"time", "sats"}
     columns: list[tuple[str, Floats]] = []
     for signal, place in _mapped(log, mapping, names, sections.get("header", [])):
-        values = cells[:, place] * signal.factor + signal.offset
         suffix = resolved_unit(signal, None, mapping.source if mapping else "")
         used.add(names[place])
-        columns.append((signal.name, to_si(values, suffix) if suffix else values))
+        columns.append((signal.name, in_si(cells[:, place], suffix, signal)))
     taken = {name for name, _ in columns}
     fixed = np.ones(clock.size, dtype=bool)
     if "sats" in places:
@@ -120,8 +118,7 @@ def read_vbo(path: Path, table: str | None, mapping: TableMapping | None) -> Log
         log.problems.append(
             Problem.of("file.ignored", file=path.name, columns=column_list(ignored))
         )
-    log.signals, problems = clean_columns(time, columns, path.name)
-    log.problems += problems
+    log.take(time, columns)
     return log
 
 
