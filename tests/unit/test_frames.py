@@ -1,7 +1,8 @@
 import numpy as np
+import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from weighbridge.io.frames import Frames, join_frames, settle_clock
+from weighbridge.io.frames import Frames, bits, join_frames, settle_clock
 from weighbridge.io.isotp import assemble
 
 
@@ -113,3 +114,21 @@ def test_single_frames_that_claim_more_than_they_hold_are_left_out():
     got = assemble(make([0.0, 1.0], data=[b"\x07\x41\x0c", b"\x02\x41\x0c"]))
     assert_array_equal(got.length, [2])
     assert_array_equal(got.time, [1.0])
+
+
+@pytest.mark.parametrize(("order", "big_endian"), [("<u8", False), (">u8", True)])
+def test_numbers_of_bits_are_those_of_the_whole_number(order, big_endian):
+    data = np.random.default_rng(1).integers(0, 256, (50, 8)).astype(np.uint8)
+    whole = [int(x) for x in data.view(order)[:, 0]]
+    for first in range(64):
+        for count in range(1, 65 - first):
+            behind = 64 - first - count if big_endian else first
+            expected = [(x >> behind) % (1 << count) for x in whole]
+            found = bits(data, first, count, big_endian=big_endian)
+            assert found.tolist() == expected
+
+
+def test_bytes_behind_the_last_read_as_zero():
+    data = np.array([[0xFF, 0xFF]], np.uint8)
+    assert bits(data, 12, 8).tolist() == [0x0F]
+    assert bits(data, 12, 8, big_endian=True).tolist() == [0xF0]

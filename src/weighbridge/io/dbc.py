@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from weighbridge.errors import ConfigError
-from weighbridge.io.frames import Frames
+from weighbridge.io.frames import Frames, bits
 from weighbridge.io.labels import is_no_value
 from weighbridge.io.libraries import importing
 from weighbridge.signals import Bools, Floats, Problem
@@ -366,22 +366,7 @@ def _bytes_needed(signal: Any) -> int:
 def _raw(data: NDArray[np.uint8], signal: Any) -> Floats | NDArray[np.int64]:
     """(n,) raw values of a signal of up to 64 bits; data shorter than it read as zero."""
     start, length = _place(signal)
-    first, last = start // 8, (start + length - 1) // 8
-    columns = [
-        data[:, k].astype(np.uint64) if k < data.shape[1] else np.zeros(len(data), np.uint64)
-        for k in range(first, last + 1)
-    ]
-    if signal.byte_order == "big_endian":
-        columns.reverse()
-        shift = 8 * (last + 1) - (start + length)
-    else:
-        shift = start % 8
-    value = np.zeros(len(data), np.uint64)
-    for k, column in enumerate(columns):
-        place = 8 * k - shift
-        value |= column << np.uint64(place) if place >= 0 else column >> np.uint64(-place)
-    if length < 64:
-        value &= np.uint64((1 << length) - 1)
+    value = bits(data, start, length, big_endian=signal.byte_order == "big_endian")
     if signal.is_float:
         kinds = {16: ("<u2", "<f2"), 32: ("<u4", "<f4"), 64: ("<u8", "<f8")}
         whole, real = kinds[length]

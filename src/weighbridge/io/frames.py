@@ -82,6 +82,38 @@ class Frames:
         )
 
 
+def bits(
+    data: NDArray[np.uint8], first: int, count: int, *, big_endian: bool = False
+) -> NDArray[np.uint64]:
+    """Whole numbers that stand in bytes.
+
+    Parameters
+    ----------
+    data : (n, w) bytes; those behind the last read as zero
+    first : bit, counted in the order in which bits are read
+    count : bits of a number, 64 at most
+    big_endian : whether the highest byte comes first
+
+    Returns
+    -------
+    (n,)
+    """
+    begin, end = first // 8, (first + count + 7) // 8
+    columns = [
+        data[:, k].astype(np.uint64) if k < data.shape[1] else np.zeros(len(data), np.uint64)
+        for k in range(begin, end)
+    ]
+    shift = first % 8
+    if big_endian:
+        columns.reverse()
+        shift = 8 * end - (first + count)
+    value = np.zeros(len(data), np.uint64)
+    for k, column in enumerate(columns):
+        place = 8 * k - shift
+        value |= column << np.uint64(place) if place >= 0 else column >> np.uint64(-place)
+    return value & np.uint64((1 << count) - 1)
+
+
 def in_order(parts: list[Frames]) -> Frames:
     """Frames one part after another, as they were written.
 

@@ -14,7 +14,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from weighbridge.io.frames import Frames
+from weighbridge.io.frames import Frames, bits
 from weighbridge.io.j1939_transport import assemble
 from weighbridge.signals import Bools, Floats, Problem, Signal
 from weighbridge.signals.cleaning import clean_signal
@@ -324,22 +324,17 @@ def spn_values(part: Frames, spn: Spn) -> Floats:
     J1939-71, table 1: codes from 0xFB.. up are no values; a switch of two bits
     is 2 in error and 3 where not available.
     """
-    width = (spn.bit - 1 + spn.bits + 7) // 8
-    first = spn.byte - 1
-    raw = np.zeros(len(part), dtype=np.uint64)
-    if part.data.shape[1] < first + width:
-        return np.full(len(part), np.nan)
-    for k in range(width):
-        raw |= part.data[:, first + k].astype(np.uint64) << np.uint64(8 * k)
-    raw = (raw >> np.uint64(spn.bit - 1)) & np.uint64((1 << spn.bits) - 1)
+    first = 8 * (spn.byte - 1) + spn.bit - 1
+    whole = 8 * part.length.astype(np.int64) >= first + spn.bits
+    raw = bits(part.data, first, spn.bits)
     top = 1 if spn.bits == 2 else (0xFB << (spn.bits - 8)) - 1
-    good = (raw <= top) & (part.length >= first + width)
+    good = (raw <= top) & whole
     if spn.name in _ABOVE_ZERO:
         good &= raw > 0
     values = raw.astype(np.float64) * spn.resolution + spn.offset
     if spn.name == "gear":
         park = raw == _PARK
-        good |= park & (part.length >= first + width)
+        good |= park & whole
         values = np.where(park, 0.0, values)
     values = np.where(good, values, np.nan)
     return to_si(values, spn.unit) if spn.unit else values

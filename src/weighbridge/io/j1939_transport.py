@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from weighbridge.io.frames import Frames
+from weighbridge.io.frames import Frames, bits
 
 # J1939-21 5.10.2.4: packets of one message come within T1 = 0.75 s (broadcast)
 # or T2 = 1.25 s; a receiver that lags may ask again, so the longer one is taken.
@@ -30,11 +30,7 @@ def assemble(control: Frames, data: Frames, wanted: int) -> tuple[Frames, int]:
         return empty, 0
     opens = np.isin(control.data[:, 0], (16, 32)) & (control.length == 8)
     ends = opens | (control.data[:, 0] == 255)
-    number = (
-        control.data[:, 5].astype(np.int64)
-        | control.data[:, 6].astype(np.int64) << 8
-        | control.data[:, 7].astype(np.int64) << 16
-    )
+    number = bits(control.data, 40, 24)
     # Bus, sender and receiver; an abort may come from either end.
     pair = _pair(control)
     back = _pair(control, swapped=True)

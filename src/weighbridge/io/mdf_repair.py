@@ -21,6 +21,8 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from weighbridge.io.frames import bits
+
 _ID_BLOCK: Final = 64
 _HEAD: Final = struct.Struct("<4s4xQQ")
 _LINK: Final = struct.Struct("<Q")
@@ -358,10 +360,7 @@ class _File:
 
 def _places(columns: np.ndarray[Any, np.dtype[np.uint8]]) -> np.ndarray[Any, np.dtype[np.int64]]:
     """Numbers of up to 7 bytes, the lowest first."""
-    found = np.zeros(len(columns), np.int64)
-    for k in range(min(columns.shape[1], 7)):
-        found |= columns[:, k].astype(np.int64) << (8 * k)
-    return found
+    return bits(columns, 0, 8 * min(columns.shape[1], 7)).astype(np.int64)
 
 
 def _inside(

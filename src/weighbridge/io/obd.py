@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from weighbridge.io.frames import Frames
+from weighbridge.io.frames import Frames, bits
 from weighbridge.io.isotp import Messages, assemble
 from weighbridge.signals import Bools, Floats, Problem, Signal
 from weighbridge.signals.cleaning import clean_signal
@@ -341,10 +341,8 @@ def _read_messages(messages: Messages, sender: _Sender) -> None:
 
 def _value(pid: Pid, raw: NDArray[np.uint8]) -> Floats:
     """Physical values [SI] of one parameter's bytes; NaN where not supported."""
-    number = np.zeros(len(raw), np.int64)
-    for k in range(pid.first, pid.first + pid.count):
-        number = (number << 8) | raw[:, k]
-    values = np.asarray((number >> pid.shift) * pid.scale + pid.offset, dtype=np.float64)
+    number = bits(raw, 8 * pid.first, 8 * pid.count - pid.shift, big_endian=True)
+    values = np.asarray(number * pid.scale + pid.offset, dtype=np.float64)
     values = to_si(values, pid.unit) if pid.unit else values
     return np.where(raw[:, 0] & pid.needs == pid.needs, values, np.nan)
 
