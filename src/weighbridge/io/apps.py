@@ -1,4 +1,4 @@
-"""Tables that apps and cars write, by the names that they give to their columns.
+"""Tables that apps, cars and control units write, by the names that they give to their columns.
 
 RaceChrono CSV v3: a line that names the app, ``Format,3``, further ``key,value`` lines, then one
 row of names, one of units and one of sources (``100: gps``, ``200: obd``, ``calc``); times count
@@ -17,6 +17,11 @@ Tesla Track Mode, ``telemetry-v1-….csv`` on a car's USB drive: the columns are
 owners published (github.com/adrianco/r-tesla-telemetry). The elapsed time is that of the lap and
 begins anew with each. Power and brake pressure are none of the quantities of a drive.
 
+Haltech NSP data logs exported as CSV: the channels are listed above rows of raw numbers. Each has a
+type that says what its whole numbers count: 0.1 km/h, 0.1 K. The types are those that several
+public programs agree on, and agree with the ranges in the header; Haltech publishes no
+specification. Channels of other types have numbers without a unit.
+
 Acceleration and rotation of RaceChrono, Torque Pro and Track Mode are left out: their signs, and
 whether gravity is in them, are not documented.
 """
@@ -30,10 +35,19 @@ from typing import Any, Final
 import numpy as np
 
 from weighbridge.errors import DriveError
+from weighbridge.io.channels import Recording
 from weighbridge.io.columns import bracketed_unit, dimension_of, unit_suffix
+from weighbridge.io.draft_time import is_clock
 from weighbridge.io.log import Log
 from weighbridge.io.mapping import MappedSignal, TableMapping, TimeColumn
-from weighbridge.io.table import RawTable, TextFormat, column_list, read_text
+from weighbridge.io.table import (
+    RawTable,
+    TextFormat,
+    column_list,
+    head,
+    read_text,
+    time_seconds,
+)
 from weighbridge.io.tabular import read_mapped, taken
 from weighbridge.io.understood import plain_head, text_of
 from weighbridge.signals import QUANTITIES, Floats, Problem
@@ -63,9 +77,9 @@ _RACECHRONO: Final = {
 """Quantity by name of the column and kind of source."""
 
 
-def is_racechrono(head: bytes) -> bool:
+def is_racechrono(begin: bytes) -> bool:
     """Return whether a file begins as RaceChrono's exports do."""
-    return plain_head(head).startswith("This file is created using RaceChrono")
+    return plain_head(begin).startswith("This file is created using RaceChrono")
 
 
 def read_racechrono(path: Path, table: str | None, mapping: TableMapping | None) -> Log:
@@ -142,9 +156,9 @@ _TORQUE_PRO: Final = (
 """Beginning of a column's name up to its unit, quantity, unit where the name has none."""
 
 
-def is_torque_pro(head: bytes) -> bool:
+def is_torque_pro(begin: bytes) -> bool:
     """Return whether a file begins as Torque Pro's track logs do."""
-    names = [c.strip().lower() for c in plain_head(head).split("\n", 1)[0].split(",")]
+    names = [c.strip().lower() for c in plain_head(begin).split("\n", 1)[0].split(",")]
     return names[:2] == ["gps time", "device time"]
 
 
@@ -204,10 +218,10 @@ _SENSOR_LOGGER: Final = {
 """By file: column, quantity, unit, and whether negative values are invalid."""
 
 
-def is_sensor_logger(head: bytes) -> bool:
+def is_sensor_logger(begin: bytes) -> bool:
     """Return whether a file begins as Sensor Logger's do."""
-    begins = plain_head(head).replace('"', "")
-    return begins.startswith(("time,seconds_elapsed,", "version,device name,"))
+    said = plain_head(begin).replace('"', "")
+    return said.startswith(("time,seconds_elapsed,", "version,device name,"))
 
 
 def read_sensor_logger(path: Path, table: str | None, mapping: TableMapping | None) -> Log:
@@ -244,9 +258,9 @@ _TRACK_MODE: Final = {
 }
 
 
-def is_track_mode(head: bytes) -> bool:
+def is_track_mode(begin: bytes) -> bool:
     """Return whether a CSV begins as Tesla's Track Mode writes it."""
-    return plain_head(head).startswith(f"{_LAP},{_TIME},Speed (")
+    return plain_head(begin).startswith(f"{_LAP},{_TIME},Speed (")
 
 
 def read_track_mode(path: Path, table: str | None, mapping: TableMapping | None) -> Log:
@@ -292,3 +306,65 @@ def _session_time(laps: Floats, elapsed: Floats) -> Floats:
     shift = np.zeros(elapsed.size)
     shift[turns + 1] = usual - step[turns]
     return elapsed + np.cumsum(shift)
+
+
+# Haltech ------------------------------------------------------------------------------------------
+
+_HEAD_LINES: Final = 20_000
+
+_HALTECH: Final = {
+    "EngineSpeed": (1.0, "rpm"),
+    "Percentage": (0.1, "%"),
+    "Pressure": (0.1, "kPa"),
+    "AbsPressure": (0.1, "kPa"),
+    "Temperature": (0.1, "k"),
+    "BatteryVoltage": (1e-3, "V"),
+    "Speed": (0.1, "km/h"),
+    "AFR": (1e-3, ""),
+    "Acceleration": (1e-3, "g"),
+    "AngularVelocity": (0.1, "deg/s"),
+    "Angle": (0.1, "deg"),
+    "Ratio": (1e-3, ""),
+}
+"""Value of one count of a type, and its unit."""
+
+
+def is_haltech(begin: bytes) -> bool:
+    """Return whether a text begins as Haltech's logs do."""
+    return plain_head(begin).startswith("%DataLog%")
+
+
+def open_haltech(path: Path, time: TimeColumn) -> Recording:
+    """Read a data log of Haltech; see `weighbridge.io.channels.Opener`.
+
+    Raises
+    ------
+    DriveError
+        It lists no channel, or has no row.
+    """
+    names: list[str] = []
+    types: list[str] = []
+    skip = -1
+    for k, line in enumerate(head(path, _HEAD_LINES)):
+        key, _, value = line.partition(" : ")
+        if key.strip() == "Channel":
+            names.append(value.strip())
+            types.append("")
+        elif key.strip() == "Type" and types:
+            types[-1] = value.strip()
+        elif names and is_clock(line.partition(",")[0]):
+            skip = k
+            break
+    if skip < 0:
+        raise DriveError(
+            f"{path} lists no channel with rows below; export it again as CSV from NSP"
+        )
+    columns = tuple(f"{k}" for k in range(1 + len(names)))
+    text = TextFormat(separator=",", skip_rows=skip, columns=columns)
+    raw = read_text(path, text, whole=True)
+    seconds, _, notes = time_seconds(raw, 0, 1.0, "clock")
+    found = Recording([], of_day=True, notes=[*raw.notes, *notes])
+    for k, (name, kind) in enumerate(zip(names, types, strict=True), start=1):
+        factor, unit = _HALTECH.get(kind, (1.0, ""))
+        found.add(raw, k, seconds, name, unit, factor)
+    return found

@@ -11,7 +11,15 @@ from numpy.typing import NDArray
 
 from weighbridge.errors import ConfigError
 from weighbridge.io.columns import UnitlessColumnError, parse_column, unit_suffix
-from weighbridge.io.dbc import Database, Found, find_signal, is_readable, message_frames, physical
+from weighbridge.io.dbc import (
+    Carried,
+    Database,
+    Found,
+    find_signal,
+    is_readable,
+    message_frames,
+    physical,
+)
 from weighbridge.io.frames import Frames
 from weighbridge.io.j1939 import decode_j1939, is_j1939
 from weighbridge.io.mapping import MappedSignal, TableMapping, lacking, resolved_unit
@@ -252,7 +260,7 @@ def _databases(
 
 def _tell_contents(
     databases: Sequence[Database],
-    carried: Sequence[dict[str, NDArray[np.intp]]],
+    carried: Carried,
     taken: dict[str, list[str]],
     used: Bools,
     done: Decoded,
@@ -310,7 +318,7 @@ def mapped_signals(
     name: str,
     mapping: TableMapping,
     databases: Sequence[Database],
-    carried: Sequence[dict[str, NDArray[np.intp]]],
+    carried: Carried,
     done: Decoded,
 ) -> Wanted:
     """Find what a mapping names in databases, of the messages that are carried."""
@@ -336,9 +344,7 @@ def mapped_signals(
     return wanted
 
 
-def canonical_signals(
-    databases: Sequence[Database], carried: Sequence[dict[str, NDArray[np.intp]]]
-) -> Wanted:
+def canonical_signals(databases: Sequence[Database], carried: Carried) -> Wanted:
     """Find what has a canonical name in databases, of the messages that are carried."""
     wanted: Wanted = {}
     for database, frames in zip(databases, carried, strict=True):

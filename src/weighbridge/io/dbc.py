@@ -11,7 +11,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -90,6 +90,10 @@ class Found:
     message: Any
     signal: Any
     frames: NDArray[np.intp]
+
+
+Carried: TypeAlias = Sequence[dict[str, NDArray[np.intp]]]
+"""Frames of each message that is in the traffic, by its name, for each database."""
 
 
 def dbc_path(source: DbcSource) -> Path:
@@ -253,9 +257,7 @@ def _group(identifier: NDArray[np.int64]) -> NDArray[np.int64]:
     return np.asarray(np.where(group >> 8 & 0xFF < 240, group & 0x3FF00, group))
 
 
-def find_signal(
-    name: str, databases: Sequence[Database], carried: Sequence[dict[str, NDArray[np.intp]]]
-) -> list[Found]:
+def find_signal(name: str, databases: Sequence[Database], carried: Carried) -> list[Found]:
     """Signals called ``name`` or, with their message, ``message.name``, that frames carry."""
     message_name, _, signal_name = name.rpartition(".")
     return [

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, field, replace
-from typing import Final, TypeAlias
+from typing import Any, Final, TypeAlias
 
 import numpy as np
 
@@ -70,6 +71,11 @@ Columns: TypeAlias = tuple[DraftColumn, ...]
 """Of one log."""
 
 
+def changed(columns: Columns, those: Collection[DraftColumn], **changes: Any) -> Columns:
+    """Columns of one log, of which those have other fields."""
+    return tuple(replace(c, **changes) if c in those else c for c in columns)
+
+
 def usual_rate(time: Floats) -> float:
     """Values per second, in the median [Hz]; NaN where fewer than two instants are known.
 
@@ -96,12 +102,8 @@ def gyro_checked(columns: Columns) -> Columns:
     if reported is None:
         return columns
     question = f"states no unit; taken as {reported.unit}, as {reported.name!r} is"
-    return tuple(
-        replace(c, unit=reported.unit, question=question)
-        if c in axes and c is not reported and not c.stated
-        else c
-        for c in columns
-    )
+    others = [c for c in axes if c is not reported and not c.stated]
+    return changed(columns, others, unit=reported.unit, question=question)
 
 
 def position_checked(columns: Columns) -> Columns:
@@ -111,19 +113,14 @@ def position_checked(columns: Columns) -> Columns:
     place = {c.quantity: c for c in columns if c.quantity in ("latitude", "longitude")}
     if {c.unit for c in place.values() if not c.stated} == {"dege7", "semicircle"}:
         question = "states no unit; taken as semicircle: 180 degrees are 1.8e9 at most in 1e-7 deg"
-        return tuple(
-            replace(c, unit="semicircle", question=question) if c in place.values() else c
-            for c in columns
-        )
+        return changed(columns, place.values(), unit="semicircle", question=question)
     sizes = {q: max(abs(c.low), abs(c.high)) for q, c in place.items() if not c.stated}
     if sizes.keys() != {"latitude", "longitude"} or max(sizes.values()) < _NULL_ISLAND:
         return columns
     if sizes["latitude"] > np.pi / 2.0 or sizes["longitude"] > np.pi:
         return columns
     question = "states no unit; taken as rad, for in degrees it would lie at sea"
-    return tuple(
-        replace(c, unit="rad", question=question) if c in place.values() else c for c in columns
-    )
+    return changed(columns, place.values(), unit="rad", question=question)
 
 
 def speed_checked(columns: Columns) -> Columns:
@@ -135,12 +132,8 @@ def speed_checked(columns: Columns) -> Columns:
     if len(speeds) != 1 or WORDS["of_a_speed"] & set(words_of(speeds[0].name)):
         return columns
     question = f"taken for {_SPEEDS[speeds[0].quantity]}; its name does not say which"
-    return tuple(
-        replace(c, question=f"{c.question}; {question}" if c.question else question, unsure=True)
-        if c is speeds[0]
-        else c
-        for c in columns
-    )
+    questions = [q for q in (speeds[0].question, question) if q]
+    return changed(columns, speeds, question="; ".join(questions), unsure=True)
 
 
 def gravity_checked(columns: Columns) -> Columns:
@@ -169,12 +162,9 @@ def gravity_checked(columns: Columns) -> Columns:
 def retarder_checked(columns: Columns) -> Columns:
     """Question a retarder's torque that counts braking positive: SPN 520 counts it negative."""
     question = "counts braking positive, SPN 520 negative: add factor = -1, or leave it out"
-    return tuple(
-        replace(c, question=question)
-        if c.quantity == "retarder_torque" and c.low >= 0.0 and c.high > 0.0
-        else c
-        for c in columns
-    )
+    those = [c for c in columns if c.quantity == "retarder_torque"]
+    positive = [c for c in those if c.low >= 0.0 and c.high > 0.0]
+    return changed(columns, positive, question=question)
 
 
 def percent_checked(columns: Columns) -> Columns:
@@ -193,5 +183,5 @@ def percent_checked(columns: Columns) -> Columns:
         return columns
     unit = "ratio" if max(abs(torque.low), torque.high) <= PERCENT[1] / 100.0 else "pct"
     question = f"states no unit; taken as a part of {reference.name!r}, for it stays within 130 %"
-    reported = replace(torque, quantity="engine_torque_fraction", unit=unit, question=question)
-    return tuple(reported if c is torque else c for c in columns)
+    fraction = "engine_torque_fraction"
+    return changed(columns, [torque], quantity=fraction, unit=unit, question=question)

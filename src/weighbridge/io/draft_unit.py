@@ -9,7 +9,7 @@ from typing import Final, TypeAlias
 import numpy as np
 
 from weighbridge.io.columns import suffixes_of, unit_suffix
-from weighbridge.io.draft_column import Columns
+from weighbridge.io.draft_column import Columns, changed
 from weighbridge.io.naming import unit_of
 from weighbridge.io.way import way_ratio
 from weighbridge.signals import QUANTITIES, Floats
@@ -150,8 +150,7 @@ def _with_judged_turns(columns: Columns, reported: Reported) -> Columns:
     if np.count_nonzero(fast) < _FEWEST or np.quantile(n[fast] / v[fast], 0.1) > _TURNS_PER_METRE:
         return columns
     question = "states no unit; taken as radps, for so few turns to the way are none of an engine"
-    found = replace(engine, unit="radps", question=question)
-    return tuple(found if c is engine else c for c in columns)
+    return changed(columns, [engine], unit="radps", question=question)
 
 
 def _with_judged_accelerations(columns: Columns, reported: Reported) -> Columns:
@@ -174,7 +173,7 @@ def _with_judged_accelerations(columns: Columns, reported: Reported) -> Columns:
         key=lambda u: abs(np.log(abs(gain[0]) * UNITS[u].factor)),
     )
     question = f"states no unit; taken as {unit}, for {speed.name!r} changes by that"
-    return tuple(replace(c, unit=unit, question=question) if c in axes else c for c in columns)
+    return changed(columns, axes, unit=unit, question=question)
 
 
 def _gain(speed: Values, accel: Values) -> tuple[float, float]:

@@ -20,7 +20,6 @@ from weighbridge.io import (
     frame_text,
     gpx,
     grouped,
-    haltech,
     hdf5,
     json_lines,
     long_csv,
@@ -32,7 +31,6 @@ from weighbridge.io import (
     openpilot,
     tabular,
     tdms,
-    tesla_fleet,
     vbo,
 )
 from weighbridge.io.channels import drafter, reader
@@ -129,11 +127,11 @@ FORMATS: Final[tuple[Format, ...]] = (
     Format(
         name="Haltech CSV",
         suffixes=(".csv",),
-        read=reader(haltech.open_haltech),
-        begins=haltech.is_haltech,
+        read=reader(apps.open_haltech),
+        begins=apps.is_haltech,
         about="channels of an engine's control unit, as NSP exports them",
         takes=Takes.CHANNELS,
-        draft=drafter(haltech.open_haltech),
+        draft=drafter(apps.open_haltech),
     ),
     Format(
         name="grouped CSV",
@@ -298,12 +296,12 @@ FORMATS: Final[tuple[Format, ...]] = (
         name="Tesla Fleet Telemetry JSON",
         # A .json is read where it is named: in a folder it is rather a result or a setting.
         suffixes=(".jsonl", ".ndjson"),
-        read=reader(tesla_fleet.open_fleet_telemetry),
-        begins=tesla_fleet.is_fleet_telemetry,
+        read=reader(json_lines.open_fleet_telemetry),
+        begins=json_lines.is_fleet_telemetry,
         magic=True,
         about="position; numbers by a mapping, for the protocol states no units",
         takes=Takes.CHANNELS,
-        draft=drafter(tesla_fleet.open_fleet_telemetry),
+        draft=drafter(json_lines.open_fleet_telemetry),
     ),
     Format(
         name="JSON lines",

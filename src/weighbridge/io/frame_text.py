@@ -604,14 +604,10 @@ def _table_head(path: Path, block: bytes) -> tuple[int, Form]:
     )  # fmt: skip
 
 
-def _whole(form: Form, path: Path) -> Pieces:
-    return ((block, form) for block in _blocks(path))
-
-
 read_asc: Final = _reader(_asc)
 read_trc: Final = _reader(partial(_with_head, _trace_head))
 read_candump: Final = _reader(partial(_with_head, _candump_head))
-read_crtd: Final = _reader(partial(_whole, _CRTD))
+read_crtd: Final = _reader(partial(_with_head, lambda *_: (0, _CRTD)))
 read_canking: Final = _reader(partial(_with_head, _canking_head))
 read_busmaster: Final = _reader(partial(_with_head, _busmaster_head))
 read_frame_table: Final = _reader(partial(_with_head, _table_head))
