@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
-import polars as pl
 
 from weighbridge.errors import DriveError
 from weighbridge.io.columns import (
@@ -143,10 +142,9 @@ class Recording:
         stated : suffix of the unit where neither mapping nor name state one of time; None to judge
             it by the values
         """
-        texts, form = raw.column(place), time.format or ""
-        if not form and texts.dtype == pl.String:
-            sample = [t.strip() for t in texts.drop_nulls().head(200).to_list() if t.strip()]
-            form, doubts = text_time_format(sample)
+        form = time.format or ""
+        if not form:
+            form, doubts = text_time_format(raw.sample(place))
             self.notes += [d for d in doubts if d not in self.notes]
         units = (time.unit, unit_of(name)[0], stated)
         unit = next((u for u in units if u in UNITS and UNITS[u].dimension == "s"), "s")

@@ -309,11 +309,9 @@ def _as_time(raw: RawTable, index: int, units: Mapping[str, str]) -> DraftTime |
     if series.dtype.is_temporal():
         seconds, _, _ = time_seconds(raw, index, 1.0, None)
         return DraftTime(name, index, "", "", seconds)
-    if series.dtype == pl.String:
-        texts = [t.strip() for t in series.drop_nulls().head(200).to_list() if t.strip()]
-        numbers = sum(map(is_number, texts))
-        if texts and numbers < 0.5 * len(texts):
-            return _text_time(raw, index, texts)
+    texts = raw.sample(index)
+    if sum(map(is_number, texts)) < 0.5 * len(texts):
+        return _text_time(raw, index, texts)
     try:
         values, _ = raw.numbers(index)
     except DriveError:

@@ -16,7 +16,7 @@ from __future__ import annotations
 import json
 import re
 from array import array
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Final
 
@@ -36,7 +36,7 @@ from weighbridge.signals import Floats
 _LIST: Final = re.compile(rb"\s*\[\s*\{")
 """Begins a list of records."""
 
-_DEEPEST: Final = 6
+_DEEPEST: Final = 8
 """Objects within objects."""
 
 
@@ -113,19 +113,19 @@ def _rows(path: Path, lines: Lines) -> Iterator[dict[str, str]]:
         strange = not isinstance(record, dict)
         lines.add(b"\n", 1, strange, int(strange))
         if not strange:
-            yield dict(_flat(record, "", 0))
+            yield {
+                name: str(int(value) if isinstance(value, bool) else value)
+                for name, value in flat(record)
+            }
 
 
-def _flat(record: Mapping[str, Any], prefix: str, depth: int) -> Iterator[tuple[str, str]]:
-    """Texts of a record and of the records in it, by name."""
-    for key, value in record.items():
-        name = f"{prefix}{key}"
-        if isinstance(value, dict) and depth < _DEEPEST:
-            yield from _flat(value, f"{name}.", depth + 1)
-        elif isinstance(value, bool):
-            yield name, str(int(value))
-        elif isinstance(value, int | float | str):
-            yield name, str(value)
+def flat(value: Any, prefix: str = "", depth: int = 0) -> Iterator[tuple[str, Any]]:
+    """Numbers and texts of a record and of the records in it, by name."""
+    if isinstance(value, dict) and depth < _DEEPEST:
+        for key, below in value.items():
+            yield from flat(below, f"{prefix}.{key}" if prefix else str(key), depth + 1)
+    elif isinstance(value, bool | int | float | str):
+        yield prefix, value
 
 
 def _wide(raw: RawTable, time: TimeColumn) -> Recording:

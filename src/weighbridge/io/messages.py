@@ -25,6 +25,7 @@ import numpy as np
 
 from weighbridge.errors import DriveError
 from weighbridge.io.channels import Channel, Recording, check_unpacked, most_unpacked
+from weighbridge.io.json_lines import flat
 from weighbridge.io.libraries import importing, reason_of
 from weighbridge.io.mapping import TimeColumn
 from weighbridge.io.table import column_list, since_1970
@@ -403,24 +404,20 @@ def _json_topic(name: str, kind: str) -> _Topic:
     topic = _Topic(name, kind, json.loads, _json_fields, lambda _: (), _json_stamp)
 
     def numbers(message: Any) -> Sequence[float]:
-        flat = dict(_flat(message, "", 0))
-        return [flat.get(f, np.nan) for f in topic.fields]
+        found = _json_numbers(message)
+        return [found.get(f, np.nan) for f in topic.fields]
 
     topic.numbers = numbers
     return topic
 
 
 def _json_fields(message: Any) -> tuple[str, ...]:
-    names = tuple(name for name, _ in _flat(message, "", 0) if not name.startswith("timestamp."))
+    names = tuple(name for name in _json_numbers(message) if not name.startswith("timestamp."))
     return names if len(names) <= _MOST_FIELDS else ()
 
 
-def _flat(value: Any, prefix: str, depth: int) -> Iterator[tuple[str, float]]:
-    if isinstance(value, dict) and depth < _DEEPEST:
-        for key, below in value.items():
-            yield from _flat(below, f"{prefix}.{key}" if prefix else str(key), depth + 1)
-    elif isinstance(value, bool | int | float):
-        yield prefix, float(value)
+def _json_numbers(message: Any) -> dict[str, float]:
+    return {name: float(x) for name, x in flat(message) if not isinstance(x, str)}
 
 
 def _json_stamp(message: Any) -> float:

@@ -133,6 +133,13 @@ class RawTable:
             return pl.Series(str(index), self.plain[index][0])
         return self.frame[str(index)]
 
+    def sample(self, index: int) -> list[str]:
+        """Some cells of a column of texts, without blanks around; none of another."""
+        if self.column(index).dtype != pl.String:
+            return []
+        cells = self.column(index).drop_nulls().head(200).to_list()
+        return [cell.strip() for cell in cells if cell.strip()]
+
     def release(self, index: int) -> None:
         """Hold a column no longer that was read and is not the last one."""
         if len(self.plain) > 1:
