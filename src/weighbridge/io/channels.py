@@ -23,10 +23,10 @@ from weighbridge.io.columns import (
     unit_suffix,
 )
 from weighbridge.io.draft import Draft, draft_column
-from weighbridge.io.draft_column import Columns, DraftColumn, checked, usual_rate
+from weighbridge.io.draft_column import DraftColumn, checked, usual_rate
 from weighbridge.io.draft_time import guessed_time_unit, text_time_format
-from weighbridge.io.draft_unit import Values, unit_in_name, with_judged_units
-from weighbridge.io.draft_values import with_judged_values
+from weighbridge.io.draft_unit import Values, unit_in_name
+from weighbridge.io.draft_values import judged
 from weighbridge.io.frames import Frames
 from weighbridge.io.log import Log, Reader
 from weighbridge.io.mapping import (
@@ -340,20 +340,6 @@ def _reported(name: str) -> str:
     return parts[-1]
 
 
-def _judged(channels: list[Channel], columns: Columns) -> Columns:
-    """Judge columns by the values of all channels."""
-    reported = {c.name: Values(c.time, c.values, unit_in_name(c.name, c.unit)) for c in channels}
-    # What the format itself knows is compared too.
-    nan = float("nan")
-    known = tuple(
-        DraftColumn(c.name, c.quantity, c.unit, True, nan, nan, nan, c.values.size)
-        for c in channels
-        if c.quantity
-    )
-    judged = with_judged_units((*columns, *known), reported)
-    return with_judged_values(judged, reported)[: len(columns)]
-
-
 def draft_of(path: Path, found: Recording) -> Draft:
     """Draft the mapping of a log of channels.
 
@@ -386,7 +372,15 @@ def draft_of(path: Path, found: Recording) -> Draft:
     )
     # Channels that are left in the file have neither instants nor values.
     channels = [c for c in (loaded.get(c.name, c) for c in channels) if c.load is None]
-    columns = _judged(channels, columns)
+    reported = {c.name: Values(c.time, c.values, unit_in_name(c.name, c.unit)) for c in channels}
+    # What the format itself knows is compared too.
+    nan = float("nan")
+    beside = tuple(
+        DraftColumn(c.name, c.quantity, c.unit, True, nan, nan, nan, c.values.size)
+        for c in channels
+        if c.quantity
+    )
+    columns = judged((*columns, *beside), reported)[: len(columns)]
     if known and not any(c.quantity for c in columns):
         raise DriveError(f"{path}: what is known of it is read as it is; it needs no mapping")
     if not any(c.quantity for c in columns):
@@ -394,8 +388,8 @@ def draft_of(path: Path, found: Recording) -> Draft:
             f"{path}: none of its channels is known by its name; it has {column_list(counted)}: "
             "write [signals] of a mapping by hand"
         )
-    reported = [c for c in channels if c.quantity or np.isfinite(c.values).any()] or channels
-    ends = [(float(np.nanmin(c.time)), float(np.nanmax(c.time))) for c in reported]
+    filled = [c for c in channels if c.quantity or np.isfinite(c.values).any()] or channels
+    ends = [(float(np.nanmin(c.time)), float(np.nanmax(c.time))) for c in filled]
     doubts = [_noted(note).text for note in found.notes]
     doubts += [
         f"{n!r} is there {k} times; the longest is taken" for n, k in counted.items() if k > 1

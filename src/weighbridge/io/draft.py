@@ -24,8 +24,8 @@ from weighbridge.io.columns import (
 from weighbridge.io.draft_column import Columns, DraftColumn, checked, is_calculated, usual_rate
 from weighbridge.io.draft_text import text_format
 from weighbridge.io.draft_time import DraftTime, by_motion, find_times, is_number, swings
-from weighbridge.io.draft_unit import Values, plausible_unit, unit_in_name, with_judged_units
-from weighbridge.io.draft_values import FOUND, with_judged_values
+from weighbridge.io.draft_unit import Values, plausible_unit, unit_in_name
+from weighbridge.io.draft_values import FOUND, judged
 from weighbridge.io.naming import LEAST, Named, bare_quantities, recognise_all, words_of
 from weighbridge.io.parquet import read_parquet
 from weighbridge.io.table import (
@@ -176,9 +176,7 @@ def draft(path: Path, names: Sequence[str] = ()) -> Draft:
     times = by_motion(times, _swings(raw, columns))
     time = times[0]
     if time.row_rate is None:
-        in_numbers = _reported(raw, time, units, columns)
-        columns = with_judged_values(columns, in_numbers)
-        columns = with_judged_units(columns, in_numbers)
+        columns = judged(columns, _reported(raw, time, units, columns))
     found = Draft(
         path=path,
         text=text,

@@ -24,6 +24,7 @@ from weighbridge.io.draft_unit import (
     Reported,
     Values,
     plausible_unit,
+    with_judged_units,
 )
 from weighbridge.io.naming import bare_quantities, means_another, words_of
 from weighbridge.signals import QUANTITIES
@@ -102,8 +103,8 @@ _TOP: Final = 95.0
 """Speed of a road vehicle, at most [m/s]."""
 
 
-def with_judged_values(columns: Columns, reported: Reported) -> Columns:
-    """Judge what columns are taken for by their values, and find what names do not show.
+def judged(columns: Columns, reported: Reported) -> Columns:
+    """Judge columns by their values: what they are, what names do not show, and units of speeds.
 
     Parameters
     ----------
@@ -121,7 +122,7 @@ def with_judged_values(columns: Columns, reported: Reported) -> Columns:
         ("brake_switch", _brakes),
     ):
         columns = _found_by_values(columns, reported, quantity, fits)
-    return columns
+    return with_judged_units(columns, reported)
 
 
 def _on_board(columns: Columns) -> Columns:
