@@ -374,9 +374,8 @@ def draft_of(path: Path, found: Recording) -> Draft:
     channels = [c for c in (loaded.get(c.name, c) for c in channels) if c.load is None]
     reported = {c.name: Values(c.time, c.values, unit_in_name(c.name, c.unit)) for c in channels}
     # What the format itself knows is compared too.
-    nan = float("nan")
     beside = tuple(
-        DraftColumn(c.name, c.quantity, c.unit, True, nan, nan, nan, c.values.size)
+        DraftColumn(c.name, c.quantity, c.unit, True, count=c.values.size)
         for c in channels
         if c.quantity
     )

@@ -21,7 +21,14 @@ from weighbridge.io.columns import (
     stated_unit,
     unit_refused,
 )
-from weighbridge.io.draft_column import Columns, DraftColumn, checked, is_calculated, usual_rate
+from weighbridge.io.draft_column import (
+    Columns,
+    DraftColumn,
+    checked,
+    is_calculated,
+    measured,
+    usual_rate,
+)
 from weighbridge.io.draft_text import text_format
 from weighbridge.io.draft_time import DraftTime, by_motion, find_times, is_number, swings
 from weighbridge.io.draft_unit import Values, plausible_unit, unit_in_name
@@ -262,13 +269,7 @@ def _numbers(raw: RawTable, column: DraftColumn) -> DraftColumn:
         values, _ = raw.numbers(raw.names.index(column.name))
     except DriveError:
         return column
-    known = values[np.isfinite(values)]
-    if known.size == 0:
-        return column
-    low, usual, high = (float(x) for x in np.quantile(known, (0.0, 0.5, 1.0)))
-    return replace(
-        column, low=low, usual=usual, high=high, count=int(known.size), rows=np.isfinite(values)
-    )
+    return replace(column, **measured(values)) if np.isfinite(values).any() else column
 
 
 def timed(found: Draft, time: DraftTime) -> Draft:
@@ -334,7 +335,7 @@ def _number(cell: object) -> bool:
 
 
 def _nothing(name: str, question: str) -> DraftColumn:
-    return DraftColumn(name, "", "", False, float("nan"), float("nan"), float("nan"), 0, question)
+    return DraftColumn(name, "", "", False, question=question)
 
 
 def draft_column(name: str, found: Named, values: Floats, stated: str | None) -> DraftColumn:
@@ -374,20 +375,9 @@ def draft_column(name: str, found: Named, values: Floats, stated: str | None) ->
         unit, question = plausible_unit(name, found.quantity, known)
         if not unit:
             return _nothing(name, question)
-    low, usual, high = map(float, np.quantile(known, [0.0, 0.5, 1.0]))
-    return DraftColumn(
-        name,
-        found.quantity,
-        unit,
-        by_log,
-        low,
-        usual,
-        high,
-        known.size,
-        question,
-        rows=np.isfinite(values),
-        unsure=found.score < 1.0 or (bool(question) and by_log),
-    )
+    unsure = found.score < 1.0 or (bool(question) and by_log)
+    column = DraftColumn(name, found.quantity, unit, by_log, question=question, unsure=unsure)
+    return replace(column, **measured(values))
 
 
 def _beyond(quantity: str, unit: str, values: Floats) -> str:

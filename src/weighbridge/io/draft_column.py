@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 from typing import Any, Final, TypeAlias
@@ -56,19 +57,27 @@ class DraftColumn:
     quantity: str
     unit: str
     stated: bool
-    low: float
-    usual: float
-    high: float
-    count: int
+    low: float = math.nan
+    usual: float = math.nan
+    high: float = math.nan
+    count: int = 0
     question: str = ""
     valid: str = ""
     unsure: bool = False
     rows: Bools | None = field(default=None, compare=False, repr=False)
-    rate: float = float("nan")
+    rate: float = math.nan
 
 
 Columns: TypeAlias = tuple[DraftColumn, ...]
 """Of one log."""
+
+
+def measured(values: Floats) -> dict[str, Any]:
+    """Fields of a column that its values show, of which one at least is a number."""
+    rows = np.isfinite(values)
+    low, usual, high = map(float, np.quantile(values[rows], (0.0, 0.5, 1.0)))
+    count = int(np.count_nonzero(rows))
+    return {"low": low, "usual": usual, "high": high, "count": count, "rows": rows}
 
 
 def changed(columns: Columns, those: Collection[DraftColumn], **changes: Any) -> Columns:

@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 
 from weighbridge.constants import GRAVITY
-from weighbridge.io.draft_column import Columns, DraftColumn
+from weighbridge.io.draft_column import Columns, DraftColumn, measured
 from weighbridge.io.draft_time import FASTEST
 from weighbridge.io.draft_unit import (
     SLOWEST,
@@ -301,20 +301,14 @@ def _found_by_values(
 
 def _taken(column: DraftColumn, quantity: str, values: Values, why: str) -> DraftColumn:
     """Take a column that was nothing for a quantity."""
-    there = values.values[np.isfinite(values.values)]
-    low, usual, high = map(float, np.quantile(there, (0.0, 0.5, 1.0)))
     return replace(
         column,
         quantity=quantity,
         unit=values.unit if QUANTITIES[quantity].suffix else "",
         stated=False,
-        low=low,
-        usual=usual,
-        high=high,
-        count=int(there.size),
-        rows=np.isfinite(values.values),
         question=f"taken for {quantity}: {why}",
         unsure=True,
+        **measured(values.values),
     )
 
 
