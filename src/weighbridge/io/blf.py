@@ -9,6 +9,7 @@ from __future__ import annotations
 import struct
 import zlib
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Final
@@ -79,10 +80,7 @@ def read_blf(path: Path, table: str | None, mapping: TableMapping | None) -> Log
             f"{path} holds no CAN frame that can be read; record it again, or copy it again"
         )
     frames = in_order(parts)
-    offset = start or 0.0
-    log.frames = Frames(
-        frames.time + offset, frames.channel, frames.id, frames.extended, frames.length, frames.data
-    )
+    log.frames = replace(frames, time=frames.time + (start or 0.0))
     return log
 
 

@@ -17,6 +17,9 @@ EXTENDED_MASK = 0x1FFFFFFF
 """The 29 bits of an extended identifier."""
 
 
+_COLUMNS: Final = ("time", "channel", "id", "extended", "length")
+
+
 @dataclass(frozen=True, slots=True)
 class Frames:
     """Data frames of one recording, of all its buses, in the order of time.
@@ -44,25 +47,20 @@ class Frames:
     @classmethod
     def empty(cls) -> Frames:
         """No frames."""
+        return cls.room(0, 8)
+
+    @classmethod
+    def room(cls, count: int, width: int) -> Frames:
+        """Room for so many frames, whose data are zeros of so many bytes."""
         return cls(
-            np.empty(0),
-            np.empty(0, np.int16),
-            np.empty(0, np.uint32),
-            np.empty(0, np.bool_),
-            np.empty(0, np.uint8),
-            np.empty((0, 8), np.uint8),
-        )
+            np.empty(count), np.empty(count, np.int16), np.empty(count, np.uint32),
+            np.empty(count, np.bool_), np.empty(count, np.uint8),
+            np.zeros((count, width), np.uint8),
+        )  # fmt: skip
 
     def select(self, which: NDArray[np.bool_] | NDArray[np.intp] | slice) -> Frames:
         """Frames under a mask, a slice or indices."""
-        return Frames(
-            self.time[which],
-            self.channel[which],
-            self.id[which],
-            self.extended[which],
-            self.length[which],
-            self.data[which],
-        )
+        return Frames(*(getattr(self, name)[which] for name in (*_COLUMNS, "data")))
 
     def counts(self, which: NDArray[np.bool_] | None = None) -> dict[tuple[int, int, bool], int]:
         """How often each (channel, id, extended) was seen, under a mask; the lowest first."""
@@ -124,24 +122,13 @@ def in_order(parts: list[Frames]) -> Frames:
         return Frames.empty()
     if len(parts) == 1:
         return parts.pop()
-    count = sum(map(len, parts))
-    joined = Frames(
-        np.empty(count),
-        np.empty(count, np.int16),
-        np.empty(count, np.uint32),
-        np.empty(count, np.bool_),
-        np.empty(count, np.uint8),
-        np.zeros((count, max(p.data.shape[1] for p in parts)), np.uint8),
-    )
+    joined = Frames.room(sum(map(len, parts)), max(p.data.shape[1] for p in parts))
     at = 0
     while parts:
         part = parts.pop()
         rows = slice(at, at + len(part))
-        joined.time[rows] = part.time
-        joined.channel[rows] = part.channel
-        joined.id[rows] = part.id
-        joined.extended[rows] = part.extended
-        joined.length[rows] = part.length
+        for name in _COLUMNS:
+            getattr(joined, name)[rows] = getattr(part, name)
         joined.data[rows, : part.data.shape[1]] = part.data
         at = rows.stop
     return joined
