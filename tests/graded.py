@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from weighbridge import Drive, Signal, Vehicle
-from weighbridge.vehicle.model import Driveline, RoadLoad
+from weighbridge.vehicle import Driveline, RoadLoad
 
 G, DENSITY, AREA, ROLLING, RADIUS = 9.80665, 1.225, 0.66, 0.011, 0.3
 CAR = Vehicle(

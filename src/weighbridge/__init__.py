@@ -17,30 +17,28 @@ __version__ = VERSION
 
 if TYPE_CHECKING:
     from weighbridge import fleet
-    from weighbridge.calibration.run import calibrate
-    from weighbridge.calibration.settings import CalibrationSettings
+    from weighbridge.calibration import CalibrationSettings, calibrate
     from weighbridge.errors import ConfigError, DriveError, MissingExtraError, WeighbridgeError
     from weighbridge.estimators import Segment, Status
     from weighbridge.inertia.filter import InertiaFilter
     from weighbridge.inertia.settings import InertiaSettings
     from weighbridge.io import read_drive, read_drives, read_frame, to_frames
     from weighbridge.io.elevation import with_elevation
-    from weighbridge.live.scale import LiveScale
-    from weighbridge.live.weighing import LiveStatus, LiveWeighing
+    from weighbridge.live import LiveScale, LiveStatus, LiveWeighing
     from weighbridge.pipeline.inertia import Inertia, estimate_inertia
     from weighbridge.pipeline.inspection import inspect_drive
     from weighbridge.pipeline.speed_bounds import CoastDown, MassBound, coast_down, mass_bound
     from weighbridge.pipeline.weighing import Weighing, compare, weigh
     from weighbridge.results.row import WeighingRow
     from weighbridge.signals import Drive, DriveInfo, Problem, Signal
-    from weighbridge.vehicle.model import Vehicle
+    from weighbridge.vehicle import Vehicle
 
 _HOMES = {
     "CoastDown": "weighbridge.pipeline.speed_bounds",
     "MassBound": "weighbridge.pipeline.speed_bounds",
     "coast_down": "weighbridge.pipeline.speed_bounds",
     "mass_bound": "weighbridge.pipeline.speed_bounds",
-    "CalibrationSettings": "weighbridge.calibration.settings",
+    "CalibrationSettings": "weighbridge.calibration",
     "ConfigError": "weighbridge.errors",
     "Drive": "weighbridge.signals",
     "DriveError": "weighbridge.errors",
@@ -48,18 +46,18 @@ _HOMES = {
     "Inertia": "weighbridge.pipeline.inertia",
     "InertiaFilter": "weighbridge.inertia.filter",
     "InertiaSettings": "weighbridge.inertia.settings",
-    "LiveScale": "weighbridge.live.scale",
-    "LiveStatus": "weighbridge.live.weighing",
-    "LiveWeighing": "weighbridge.live.weighing",
+    "LiveScale": "weighbridge.live",
+    "LiveStatus": "weighbridge.live",
+    "LiveWeighing": "weighbridge.live",
     "MissingExtraError": "weighbridge.errors",
     "Problem": "weighbridge.signals",
     "Segment": "weighbridge.estimators",
     "Signal": "weighbridge.signals",
     "Status": "weighbridge.estimators",
-    "Vehicle": "weighbridge.vehicle.model",
+    "Vehicle": "weighbridge.vehicle",
     "Weighing": "weighbridge.pipeline.weighing",
     "WeighbridgeError": "weighbridge.errors",
-    "calibrate": "weighbridge.calibration.run",
+    "calibrate": "weighbridge.calibration",
     "compare": "weighbridge.pipeline.weighing",
     "estimate_inertia": "weighbridge.pipeline.inertia",
     "inspect_drive": "weighbridge.pipeline.inspection",

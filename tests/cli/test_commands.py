@@ -14,7 +14,7 @@ from weighbridge.cli.own_masses import own_masses
 from weighbridge.estimators import ESTIMATORS
 from weighbridge.papers import jensen2022
 from weighbridge.simulation import make_scenario, simulate_car
-from weighbridge.vehicle.model import Driveline
+from weighbridge.vehicle import Driveline
 
 COMMANDS = ("demo", "inspect", "calibrate", "weigh", "simulate", "reproduce")
 

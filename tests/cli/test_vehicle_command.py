@@ -9,7 +9,7 @@ import pytest
 from tests.noted import named, says
 
 from weighbridge import Vehicle
-from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
+from weighbridge.vehicle import TORQUE_SOURCES
 
 
 def test_a_file_from_papers_is_told_and_names_the_next_command(weighbridge, tmp_path):

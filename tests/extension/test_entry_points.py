@@ -9,8 +9,7 @@ import weighbridge as wb
 from weighbridge import ConfigError
 from weighbridge.estimators import ESTIMATORS
 from weighbridge.simulation import make_scenario, simulate_car
-from weighbridge.vehicle.classes import VEHICLE_CLASSES
-from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
+from weighbridge.vehicle import TORQUE_SOURCES, VEHICLE_CLASSES
 
 FILES = {
     "fuel_source": code("fuel_source.py"),

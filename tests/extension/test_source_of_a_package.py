@@ -9,8 +9,7 @@ from tests.noted import error
 from tests.recipes import code, entry_points
 
 from weighbridge import ConfigError
-from weighbridge.live.feed import Feed
-from weighbridge.live.sources import SOURCES, parse_source
+from weighbridge.live import SOURCES, Feed, parse_source
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ from pathlib import Path
 import polars as pl
 
 from weighbridge.io import write_drive
-from weighbridge.vehicle.known import Known, describe
+from weighbridge.vehicle import Known, describe
 
 # What differs between two runs of the same drive.
 RUN = ("weighed_at",)

@@ -11,7 +11,7 @@ from weighbridge import ConfigError, Drive, DriveError
 from weighbridge.fleet.inputs import Recording, recordings
 from weighbridge.fleet.store import Results
 from weighbridge.fleet.vehicles import Vehicles
-from weighbridge.vehicle.known import Known, describe
+from weighbridge.vehicle import Known, describe
 
 
 def names(*given):

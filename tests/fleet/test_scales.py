@@ -18,7 +18,7 @@ from weighbridge.fleet.kept import keep_legs
 from weighbridge.fleet.scales import Weighed, find_scales
 from weighbridge.fleet.store import Results, write_part
 from weighbridge.fleet.vehicles import Vehicles
-from weighbridge.vehicle.known import Known, describe
+from weighbridge.vehicle import Known, describe
 
 TARE, GROSS = 9000.0, 18000.0
 BEGIN = datetime.fromisoformat("2026-05-04T06:00:00+00:00")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from weighbridge import ConfigError, LiveStatus, LiveWeighing
-from weighbridge.live.alerts import Alert
+from weighbridge.live import Alert
 
 
 def weighing(mass, std=50.0, status=LiveStatus.WEIGHED):

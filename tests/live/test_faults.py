@@ -10,10 +10,7 @@ import pytest
 import weighbridge as wb
 from weighbridge import LiveStatus
 from weighbridge.errors import SourceError
-from weighbridge.live.feed import Feed
-from weighbridge.live.outputs import Outputs
-from weighbridge.live.replay import Replay
-from weighbridge.live.session import Session
+from weighbridge.live import Feed, Outputs, Replay, Session
 from weighbridge.signals.recent import LONGEST_STEP
 
 IMU = tuple(f"{kind}_{axis}" for kind in ("accel", "gyro") for axis in "xyz")

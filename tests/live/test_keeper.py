@@ -10,10 +10,9 @@ import weighbridge as wb
 from tests.noted import named
 from weighbridge import DriveInfo, Vehicle
 from weighbridge.estimators.judging import STOP
-from weighbridge.live import clock
-from weighbridge.live.keeper import Keeper
+from weighbridge.live import Keeper, clock
 from weighbridge.signals.recent import BEHIND, STEP
-from weighbridge.vehicle.model import Driveline
+from weighbridge.vehicle import Driveline
 
 
 @pytest.fixture(scope="module")

@@ -11,11 +11,7 @@ import weighbridge as wb
 from tests.live.test_scale import blocks, even, fed
 from tests.live.test_session import Shown
 from weighbridge import LiveStatus
-from weighbridge.live import looking
-from weighbridge.live.feed import Feed
-from weighbridge.live.outputs import Outputs
-from weighbridge.live.replay import Replay
-from weighbridge.live.session import Session
+from weighbridge.live import Feed, Outputs, Replay, Session, looking
 from weighbridge.signals.recent import LONGEST_STEP
 
 

@@ -7,7 +7,8 @@ import pytest
 
 from tests.noted import error
 from weighbridge import ConfigError
-from weighbridge.live.orders import OrderFile, orders
+from weighbridge.live import OrderFile
+from weighbridge.live.orders import orders
 
 needs_pipes = pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="there are no named pipes")
 

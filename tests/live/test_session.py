@@ -11,13 +11,7 @@ import pytest
 import weighbridge as wb
 from weighbridge import ConfigError, LiveScale
 from weighbridge.errors import SourceError
-from weighbridge.live.alerts import Alert
-from weighbridge.live.feed import Feed
-from weighbridge.live.keeper import Keeper
-from weighbridge.live.outputs import Outputs
-from weighbridge.live.recorder import Recorder
-from weighbridge.live.replay import Replay
-from weighbridge.live.session import Session, order
+from weighbridge.live import Alert, Feed, Keeper, Outputs, Recorder, Replay, Session, order
 
 
 class Shown:

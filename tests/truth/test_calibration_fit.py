@@ -6,7 +6,7 @@ from scipy.optimize import minimize
 
 from weighbridge.calibration.grid import TABLE_5, grid_search
 from weighbridge.calibration.regression import TorqueRows, driven_slope, fit
-from weighbridge.vehicle.classes import VEHICLE_CLASSES
+from weighbridge.vehicle import VEHICLE_CLASSES
 
 TORQUE = np.array([-15.0, 900.0, 0.03])
 ROAD = np.array([0.62, 0.0093, 0.17, 5.0])

@@ -18,9 +18,9 @@ from weighbridge.estimators.considered import (
 )
 from weighbridge.estimators.joint.slow_errors import design
 from weighbridge.kernels import disturbance as kernel
-from weighbridge.navigation.select import find_motion
+from weighbridge.navigation import find_motion
 from weighbridge.simulation import MIDSIZE, Scenario, short_route, simulate_car
-from weighbridge.vehicle.model import Driveline, Provenance, RoadLoad, TorqueModel
+from weighbridge.vehicle import Driveline, Provenance, RoadLoad, TorqueModel
 
 MASS = 1700.0
 CAR = Vehicle(

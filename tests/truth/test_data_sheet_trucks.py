@@ -8,8 +8,7 @@ import pytest
 import weighbridge as wb
 from weighbridge import Vehicle
 from weighbridge.simulation import Sensors, make_scenario, simulate_car
-from weighbridge.vehicle.classes import VEHICLE_CLASSES
-from weighbridge.vehicle.model import Driveline, RoadLoad, TorqueModel
+from weighbridge.vehicle import VEHICLE_CLASSES, Driveline, RoadLoad, TorqueModel
 
 SEEDS = (61_001, 61_002, 61_003)
 

@@ -9,7 +9,7 @@ from weighbridge import Vehicle
 from weighbridge.balance import ForceBalance, ForceTable
 from weighbridge.balance.height_scale import height_scale
 from weighbridge.constants import GRAVITY
-from weighbridge.vehicle.model import Driveline, RoadLoad
+from weighbridge.vehicle import Driveline, RoadLoad
 
 MASS = 12_000.0
 TRUCK = Vehicle(

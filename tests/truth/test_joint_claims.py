@@ -11,7 +11,7 @@ from weighbridge import Signal, Status, Vehicle
 from weighbridge.balance import force_balance
 from weighbridge.estimators import ESTIMATORS
 from weighbridge.estimators.joint import batch
-from weighbridge.navigation.select import find_motion
+from weighbridge.navigation import find_motion
 from weighbridge.simulation import (
     ELECTRIC,
     MIDSIZE,
@@ -22,7 +22,7 @@ from weighbridge.simulation import (
     mixed_route,
     simulate_car,
 )
-from weighbridge.vehicle.model import Driveline, RoadLoad, Timing, TorqueModel
+from weighbridge.vehicle import Driveline, RoadLoad, Timing, TorqueModel
 
 DRIVES = 5
 MOST_MOVED = 0.003

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 from weighbridge import Vehicle
 from weighbridge.balance import ForceTable, law
 from weighbridge.simulation import MIDSIZE, Effects, Sensors, make_scenario, simulate_car
-from weighbridge.vehicle.model import Driveline, RoadLoad, TorqueModel
+from weighbridge.vehicle import Driveline, RoadLoad, TorqueModel
 
 CAR = Vehicle(
     tare=1500.0,

@@ -13,7 +13,7 @@ from weighbridge.estimators.joint.load_stops import change_odds, loadable, stood
 from weighbridge.kernels import disturbance
 from weighbridge.kernels import load_change as kernel
 from weighbridge.simulation import Loading, Sensors, make_scenario, simulate_car
-from weighbridge.vehicle.model import Driveline
+from weighbridge.vehicle import Driveline
 
 
 def drive(jump, seed=3, n=300, at=150):

@@ -7,7 +7,7 @@ import pytest
 
 from weighbridge.balance.averaging import WINDOW, windows
 from weighbridge.estimators.joint.slow_errors import motion_variance
-from weighbridge.navigation.select import find_motion
+from weighbridge.navigation import find_motion
 from weighbridge.simulation import MIDSIZE, Scenario, short_route, simulate_car
 
 

@@ -9,12 +9,12 @@ from tests.noted import refused
 import weighbridge as wb
 from weighbridge import Vehicle
 from weighbridge.balance import force_balance
-from weighbridge.calibration.run import run_calibration
-from weighbridge.navigation.select import find_motion
+from weighbridge.calibration import run_calibration
+from weighbridge.navigation import find_motion
 from weighbridge.pipeline.forward import forward_weigh, identify_forward
 from weighbridge.simulation import Sensors, make_scenario, simulate_car
+from weighbridge.vehicle import Driveline
 from weighbridge.vehicle.gear import UNSLIPPED
-from weighbridge.vehicle.model import Driveline
 
 
 def drive(payload, seed, name="cvt-calibration"):

@@ -23,7 +23,7 @@ from weighbridge.simulation import (
     straight_route,
     usual_polling,
 )
-from weighbridge.vehicle.model import Driveline, Mounting, Provenance, RoadLoad, TorqueModel
+from weighbridge.vehicle import Driveline, Mounting, Provenance, RoadLoad, TorqueModel
 
 METHODS = ("vahidi-rls", "holm-ekf", "ritter-batch", "fathy-events")
 PAPERS = Effects.only(

@@ -10,7 +10,7 @@ import weighbridge as wb
 from weighbridge.balance.law import accessory_column
 from weighbridge.calibration import joint as joint_fit
 from weighbridge.estimators.joint import batch
-from weighbridge.navigation.motion import BY_SPEED
+from weighbridge.navigation import BY_SPEED
 from weighbridge.pipeline.forward import forward_weigh, identify_forward
 from weighbridge.simulation import (
     MIDSIZE,

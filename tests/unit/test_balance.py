@@ -12,8 +12,8 @@ from weighbridge.balance import Reason, force_balance
 from weighbridge.balance.gear_fit import share_on_gears
 from weighbridge.balance.law import drag_force, rotating_mass
 from weighbridge.estimators.rls import estimate
-from weighbridge.navigation.motion import Motion
-from weighbridge.vehicle.model import Driveline, RoadLoad, Timing, TorqueModel
+from weighbridge.navigation import Motion
+from weighbridge.vehicle import Driveline, RoadLoad, Timing, TorqueModel
 
 END = 400.0
 CLOCK = np.arange(0.0, END, 0.1)

@@ -16,13 +16,13 @@ from tests.unit.test_report import written
 from weighbridge import CalibrationSettings, ConfigError, Signal, Vehicle, calibrate, weigh
 from weighbridge.balance import force_balance
 from weighbridge.balance.law import force_on_mass, mass_column
-from weighbridge.calibration import self_weighing
-from weighbridge.calibration.printed import TrainingSettings
-from weighbridge.calibration.run import (
+from weighbridge.calibration import (
+    TrainingSettings,
     run_calibration,
     run_speed_calibration,
-    unfound_gears,
+    self_weighing,
 )
+from weighbridge.calibration.run import unfound_gears
 from weighbridge.cli.calibrate import speed_table, table
 from weighbridge.simulation import (
     Scenario,
@@ -34,8 +34,7 @@ from weighbridge.simulation import (
     simulate_car,
     usual_polling,
 )
-from weighbridge.vehicle.model import Driveline, TorqueModel
-from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
+from weighbridge.vehicle import TORQUE_SOURCES, Driveline, TorqueModel
 
 pytestmark = pytest.mark.skipif(
     bool(config.DISABLE_JIT), reason="a whole drive takes minutes without the compiler"

@@ -11,8 +11,8 @@ import weighbridge as wb
 from weighbridge.balance import force_balance
 from weighbridge.checks import correct_drive
 from weighbridge.messages import phrase
+from weighbridge.navigation import find_motion
 from weighbridge.navigation.clock_lag import Integrated, find_lags
-from weighbridge.navigation.select import find_motion
 from weighbridge.signals import QUANTITIES
 from weighbridge.simulation import MIDSIZE, Scenario, Sensors, jensen_route, simulate_car
 

@@ -13,6 +13,7 @@ from weighbridge.balance import ForceTable, Reason
 from weighbridge.estimators.joint.confounded import inertia_relative_std
 from weighbridge.estimators.joint.slow_errors import DATA_SHEET_NAMES, NAMES, design, prior_std
 from weighbridge.estimators.judging import SQUAT_STD, uncalibrated_std
+from weighbridge.vehicle import Driveline, Provenance, TorqueModel
 from weighbridge.vehicle.data_sheet import (
     ACCESSORY_POWER,
     by_data_sheet,
@@ -20,7 +21,6 @@ from weighbridge.vehicle.data_sheet import (
     scale_std,
     wheel_efficiency,
 )
-from weighbridge.vehicle.model import Driveline, Provenance, TorqueModel
 from weighbridge.vehicle.torque import engine_torque
 
 GEARS = (12.0, 7.0, 4.5, 3.2)

@@ -8,7 +8,7 @@ import pytest
 import weighbridge as wb
 from weighbridge.estimators.joint.load_stops import unseen_std
 from weighbridge.simulation import make_scenario, simulate_car, usual_polling
-from weighbridge.vehicle.known import Known, describe
+from weighbridge.vehicle import Known, describe
 
 
 def slow_bus(seed, mass):

@@ -14,7 +14,7 @@ from weighbridge.calibration.questionable_masses import (
     with_findings,
 )
 from weighbridge.messages import phrase
-from weighbridge.vehicle.model import TorqueModel
+from weighbridge.vehicle import TorqueModel
 
 NAMES, MASSES = ("a", "b", "c"), (1600.0, 1800.0, 2000.0)
 STDS = np.full(3, 0.006)

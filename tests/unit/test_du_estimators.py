@@ -15,7 +15,7 @@ from weighbridge.estimators import ESTIMATORS
 from weighbridge.estimators import ekf as ekf_rows
 from weighbridge.estimators import robust_rls as robust_rows
 from weighbridge.kernels import mass_ekf as kernel
-from weighbridge.vehicle.model import Driveline, Provenance, RoadLoad, TorqueModel
+from weighbridge.vehicle import Driveline, Provenance, RoadLoad, TorqueModel
 
 METHODS = ("robust-rls", "ekf", "hybrid")
 robust_rls, ekf, hybrid = (ESTIMATORS[method] for method in METHODS)

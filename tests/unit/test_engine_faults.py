@@ -16,11 +16,11 @@ from weighbridge.checks import check_drive, correct_drive
 from weighbridge.estimators import ESTIMATORS
 from weighbridge.estimators.joint import changing
 from weighbridge.estimators.joint.contradicted import contradicted
-from weighbridge.navigation.select import without_accelerometer
+from weighbridge.navigation import without_accelerometer
 from weighbridge.pipeline.weighing import weigh_balance
 from weighbridge.signals import QUANTITIES
 from weighbridge.simulation import make_scenario, simulate_car
-from weighbridge.vehicle.model import DraggedReading, Driveline, TorqueModel
+from weighbridge.vehicle import DraggedReading, Driveline, TorqueModel
 
 joint = ESTIMATORS["joint"]
 

@@ -15,7 +15,7 @@ from weighbridge.pipeline.expected import (
     excitation,
     expected,
 )
-from weighbridge.vehicle.model import Provenance
+from weighbridge.vehicle import Provenance
 
 HOME = Path(__file__).parents[2]
 PAGE = (HOME / "docs" / "accuracy.md").read_text("utf-8")

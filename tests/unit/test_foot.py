@@ -11,8 +11,8 @@ from weighbridge.balance import Reason, force_balance
 from weighbridge.balance.floor import Floor, find_floor
 from weighbridge.constants import GRAVITY
 from weighbridge.kernels import two_states
-from weighbridge.navigation.motion import Motion
-from weighbridge.vehicle.model import DraggedReading, Driveline, RoadLoad, Timing, TorqueModel
+from weighbridge.navigation import Motion
+from weighbridge.vehicle import DraggedReading, Driveline, RoadLoad, Timing, TorqueModel
 
 END = 1200.0
 CLOCK = np.arange(0.0, END, 0.05)

@@ -10,8 +10,7 @@ from tests.noted import refused
 import weighbridge as wb
 from weighbridge.papers.jensen2022_drives import without_weather
 from weighbridge.simulation import make_scenario, random_vehicle, simulate_car, usual_polling
-from weighbridge.vehicle.model import Driveline, TorqueModel
-from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
+from weighbridge.vehicle import TORQUE_SOURCES, Driveline, TorqueModel
 
 LATE = 0.08
 """Readings are as late as this [s]."""

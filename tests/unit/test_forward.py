@@ -27,7 +27,7 @@ from weighbridge.simulation import (
     short_route,
     simulate_car,
 )
-from weighbridge.vehicle.model import TorqueModel
+from weighbridge.vehicle import TorqueModel
 
 COLUMNS = tuple(f.name for f in fields(ForceTable) if f.name not in ("set_off", "ratio_rate"))
 

@@ -11,8 +11,8 @@ from weighbridge import Drive, Signal, Vehicle
 from weighbridge.balance.law import mass_column
 from weighbridge.estimators import ESTIMATORS
 from weighbridge.simulation import MIDSIZE, Polling, Scenario, Sensors, short_route, simulate_car
+from weighbridge.vehicle import Driveline
 from weighbridge.vehicle.fuel import DENSITY, SEEN, Burnt, fuel_burnt, fuel_flow
-from weighbridge.vehicle.model import Driveline
 
 joint = ESTIMATORS["joint"]
 

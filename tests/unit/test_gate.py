@@ -14,7 +14,7 @@ from weighbridge.estimators import ESTIMATORS, fit_std, judging
 from weighbridge.estimators.fit_std import honest_std, slow_std
 from weighbridge.pipeline.weighing import weigh_balance
 from weighbridge.simulation import MIDSIZE, Scenario, short_route, simulate_car
-from weighbridge.vehicle.model import Driveline, Provenance, RoadLoad, TorqueModel
+from weighbridge.vehicle import Driveline, Provenance, RoadLoad, TorqueModel
 
 METHODS = ("joint", "rls", "robust-rls", "ekf", "hybrid")
 ANY_WIDTH = {"widest": np.inf}

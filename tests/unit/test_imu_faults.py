@@ -14,7 +14,7 @@ from weighbridge import Signal
 from weighbridge.checks import check_drive, correct_drive
 from weighbridge.navigation.inertial import inertial_motion
 from weighbridge.simulation import Sensors, make_scenario, simulate_car
-from weighbridge.vehicle.model import Mounting
+from weighbridge.vehicle import Mounting
 
 pytestmark = pytest.mark.skipif(
     bool(config.DISABLE_JIT), reason="whole drives take minutes without the compiler"

@@ -16,9 +16,9 @@ from weighbridge.estimators.joint import batch
 from weighbridge.estimators.joint import forward as joint_forward
 from weighbridge.estimators.joint.slow_errors import DATA_SHEET_NAMES, design, usable_rows
 from weighbridge.estimators.noisy_motion import too_low
-from weighbridge.navigation.select import without_accelerometer
+from weighbridge.navigation import without_accelerometer
 from weighbridge.simulation import MIDSIZE, Scenario, short_route, simulate_car
-from weighbridge.vehicle.model import Driveline, TorqueModel
+from weighbridge.vehicle import Driveline, TorqueModel
 
 joint = ESTIMATORS["joint"]
 

@@ -7,11 +7,8 @@ import pytest
 from tests.noted import error, named
 
 from weighbridge import ConfigError, Vehicle
-from weighbridge.vehicle.classes import VEHICLE_CLASSES
+from weighbridge.vehicle import TORQUE_SOURCES, VEHICLE_CLASSES, Known, describe, save_vehicle
 from weighbridge.vehicle.data_sheet import RADIUS_STD
-from weighbridge.vehicle.file import save_vehicle
-from weighbridge.vehicle.known import Known, describe
-from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 

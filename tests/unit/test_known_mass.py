@@ -9,7 +9,7 @@ import weighbridge as wb
 from weighbridge import ConfigError, Drive, DriveInfo, Vehicle
 from weighbridge.calibration.known_mass import POUND, check_mass, drag_finding, scale_finding
 from weighbridge.simulation import Sensors, make_scenario, simulate_car
-from weighbridge.vehicle.model import RoadLoad, TorqueModel
+from weighbridge.vehicle import RoadLoad, TorqueModel
 
 DRIVE = Drive("drive", {})
 

@@ -8,8 +8,7 @@ import pytest
 
 from weighbridge import ConfigError, Signal, weigh
 from weighbridge.simulation import SimulatedCar, make_scenario, simulate_car
-from weighbridge.vehicle.classes import VEHICLE_CLASSES
-from weighbridge.vehicle.known import Known, describe
+from weighbridge.vehicle import VEHICLE_CLASSES, Known, describe
 
 GEARS = (2.58, 1.93, 1.55, 1.33, 1.20, 1.11)
 FINAL_DRIVE = 1.71 * 2.6

@@ -11,9 +11,9 @@ from tests.unit.test_stream import truck_rows
 
 from weighbridge import ConfigError
 from weighbridge.errors import SourceError
+from weighbridge.live import Feed, parse_source
 from weighbridge.live import feed as feed_module
-from weighbridge.live.feed import Feed
-from weighbridge.live.sources import canbus, parse_source
+from weighbridge.live.sources import canbus
 
 can = pytest.importorskip("can")
 

@@ -9,8 +9,7 @@ from tests.noted import error
 
 from weighbridge import ConfigError
 from weighbridge.errors import SourceError
-from weighbridge.live.feed import Feed
-from weighbridge.live.sources import parse_source
+from weighbridge.live import Feed, parse_source
 from weighbridge.live.sources.elm import SETUP, ElmCarrier
 from weighbridge.live.sources.elm_text import read_reply, read_voltage
 

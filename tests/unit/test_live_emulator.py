@@ -16,13 +16,11 @@ from weighbridge import ConfigError, Drive, DriveError, Signal
 from weighbridge.errors import SourceError
 from weighbridge.io.nmea import read_sentence
 from weighbridge.io.obd import LENGTHS, PIDS, bytes_of, parameters_of, values_of
-from weighbridge.live import clock
+from weighbridge.live import Feed, clock, parse_source
 from weighbridge.live.emulator.devices import devices
 from weighbridge.live.emulator.lines import InertialLines
 from weighbridge.live.emulator.played import Played
 from weighbridge.live.emulator.sentences import Sentences
-from weighbridge.live.feed import Feed
-from weighbridge.live.sources import parse_source
 from weighbridge.live.sources.elm_text import read_reply
 from weighbridge.live.sources.lines import LineReader
 from weighbridge.live.sources.schedule import supported_of

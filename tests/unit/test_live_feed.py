@@ -8,10 +8,10 @@ import pytest
 
 from weighbridge import ConfigError, MissingExtraError
 from weighbridge.errors import SourceError
+from weighbridge.live import SOURCES, Feed, parse_source
 from weighbridge.live.clock import now
 from weighbridge.live.device_clock import DeviceClock
-from weighbridge.live.feed import Feed, trouble_text
-from weighbridge.live.sources import SOURCES, parse_source
+from weighbridge.live.feed import trouble_text
 
 
 def block(k):

@@ -11,9 +11,8 @@ import pytest
 
 from weighbridge import ConfigError
 from weighbridge.io.nmea import UnfitSentenceError, read_sentence
-from weighbridge.live.feed import Feed
+from weighbridge.live import Feed, parse_source
 from weighbridge.live.sources import gpsd as gpsd_module
-from weighbridge.live.sources import parse_source
 from weighbridge.live.sources import receiver as receiver_module
 from weighbridge.live.sources.gpsd import read_report
 from weighbridge.live.sources.nmea import SentenceReader

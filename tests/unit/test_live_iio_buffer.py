@@ -10,7 +10,7 @@ import pytest
 from tests.noted import error
 
 from weighbridge.errors import SourceError
-from weighbridge.live.feed import Feed
+from weighbridge.live import Feed
 from weighbridge.live.sources import iio as iio_module
 from weighbridge.live.sources.iio import IioSource
 from weighbridge.live.sources.iio_buffer import UnbufferedError, buffered

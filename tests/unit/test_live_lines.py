@@ -11,7 +11,7 @@ from tests.noted import error
 from tests.unit.made_weighings import drive, weighing
 
 from weighbridge import ConfigError, WeighbridgeError
-from weighbridge.live.outputs import Outputs
+from weighbridge.live import Outputs
 from weighbridge.live.outputs.lines import Lines, json_line
 
 

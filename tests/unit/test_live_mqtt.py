@@ -15,7 +15,7 @@ from tests.noted import error
 from tests.unit.made_weighings import drive, weighing
 
 from weighbridge import ConfigError, LiveStatus, WeighbridgeError
-from weighbridge.live.alerts import Alert
+from weighbridge.live import Alert
 from weighbridge.live.outputs.lines import json_line
 from weighbridge.live.outputs.mqtt import Mqtt, Topics, parse_broker, slug
 from weighbridge.live.outputs.outbox import Outbox

@@ -10,8 +10,7 @@ from weighbridge import ConfigError
 from weighbridge.errors import SourceError
 from weighbridge.io.frames import Frames
 from weighbridge.io.obd import LENGTHS, PIDS, decode_obd, parameters_of, values_of
-from weighbridge.live.feed import Feed
-from weighbridge.live.sources import parse_source
+from weighbridge.live import Feed, parse_source
 from weighbridge.live.sources import polling as polling_module
 from weighbridge.live.sources import schedule as schedule_module
 from weighbridge.live.sources.canbus import BusPlace

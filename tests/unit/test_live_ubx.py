@@ -7,8 +7,7 @@ import tty
 import pytest
 from tests.unit.test_live_gnss import gga, rmc
 
-from weighbridge.live.feed import Feed
-from weighbridge.live.sources import parse_source
+from weighbridge.live import Feed, parse_source
 from weighbridge.live.sources import receiver as receiver_module
 from weighbridge.live.sources.ubx import UbxReader
 

@@ -7,7 +7,7 @@ from tests.noted import refused
 
 from weighbridge import Drive, DriveError, Signal
 from weighbridge.constants import GRAVITY
-from weighbridge.navigation.select import find_motion
+from weighbridge.navigation import find_motion
 
 TIME = np.arange(0.0, 600.0, 0.1)
 W = 2.0 * np.pi / 25.0

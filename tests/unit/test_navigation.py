@@ -15,13 +15,13 @@ from weighbridge import ConfigError, Drive, Signal, Vehicle
 from weighbridge.constants import GRAVITY
 from weighbridge.kernels.ins_model import P
 from weighbridge.kernels.lowpass import lowpass_even, lowpass_resample
+from weighbridge.navigation import find_motion
 from weighbridge.navigation.geodesy import LocalFrame
 from weighbridge.navigation.identify.timing import estimate_speed_delay
 from weighbridge.navigation.inertial import inertial_motion
 from weighbridge.navigation.rows import place_nodes
-from weighbridge.navigation.select import find_motion
 from weighbridge.navigation.settings import NavigationSettings
-from weighbridge.vehicle.model import Driveline, Mounting
+from weighbridge.vehicle import Driveline, Mounting
 
 SQUAT = 0.004
 

@@ -9,7 +9,7 @@ import pytest
 import weighbridge as wb
 from weighbridge import Signal
 from weighbridge.checks import check_drive
-from weighbridge.vehicle.known import Known, describe
+from weighbridge.vehicle import Known, describe
 
 
 @pytest.fixture(scope="module")

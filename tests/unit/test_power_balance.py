@@ -9,11 +9,16 @@ from numpy.testing import assert_allclose
 import weighbridge as wb
 from weighbridge import Drive, Signal, Vehicle, inspect_drive
 from weighbridge.simulation import ELECTRIC, Sensors, make_scenario, simulate_car
-from weighbridge.vehicle.classes import VEHICLE_CLASSES
+from weighbridge.vehicle import (
+    TORQUE_SOURCES,
+    VEHICLE_CLASSES,
+    Driveline,
+    Provenance,
+    RoadLoad,
+    TorqueModel,
+)
 from weighbridge.vehicle.data_sheet import scale_std
-from weighbridge.vehicle.model import Driveline, Provenance, RoadLoad, TorqueModel
 from weighbridge.vehicle.power_balance import METER_STD, by_power, find_power_balance
-from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
 
 VOLTS = 370.0
 

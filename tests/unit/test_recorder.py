@@ -15,7 +15,8 @@ from tests.noted import error
 from weighbridge import DriveError, DriveInfo, read_drive
 from weighbridge.io import read_table, write_drive
 from weighbridge.io.parts import join_parts, part_files
-from weighbridge.live.recorder import Recorder, free_folder
+from weighbridge.live import Recorder
+from weighbridge.live.recorder import free_folder
 
 BEGIN = 1_790_000_000.25
 

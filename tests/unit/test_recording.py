@@ -10,9 +10,8 @@ from tests.unit.test_recorder import second
 
 from weighbridge import ConfigError, DriveError, Vehicle, read_drive
 from weighbridge.cli import record
-from weighbridge.live.arrival import Arrivals, needs
-from weighbridge.live.recorder import Recorder
-from weighbridge.vehicle.model import TorqueModel
+from weighbridge.live import Arrivals, Recorder, needs
+from weighbridge.vehicle import TorqueModel
 
 
 class Feed:

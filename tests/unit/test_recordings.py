@@ -9,7 +9,8 @@ import pytest
 from tests.unit.test_recorder import Clock, run, second
 
 from weighbridge import read_drive
-from weighbridge.live.recordings import LOOKED, Recordings, series
+from weighbridge.live import Recordings
+from weighbridge.live.recordings import LOOKED, series
 
 DAY = 86_400.0
 SECONDS = 200

@@ -9,10 +9,10 @@ from weighbridge import Signal, Vehicle
 from weighbridge.balance import force_balance
 from weighbridge.balance.law import drag_force
 from weighbridge.calibration.regression import build_rows
+from weighbridge.navigation import find_motion
 from weighbridge.navigation.inertial import inertial_motion
-from weighbridge.navigation.select import find_motion
 from weighbridge.simulation import make_scenario, simulate_car
-from weighbridge.vehicle.model import Driveline, Mounting, TorqueModel
+from weighbridge.vehicle import Driveline, Mounting, TorqueModel
 
 
 @pytest.fixture(scope="module")

@@ -17,12 +17,12 @@ from tests.noted import error, noted
 from weighbridge import ConfigError, Drive, DriveInfo, Segment, Signal, Status, Vehicle, Weighing
 from weighbridge.balance import ForceBalance, ForceTable, Reason
 from weighbridge.estimators import MassTrack
+from weighbridge.navigation import Motion
 from weighbridge.navigation.geodesy import LocalFrame
-from weighbridge.navigation.motion import Motion
 from weighbridge.report import mass_figure, write_report
 from weighbridge.results.calibration import Calibration, DelaySearch, FittedRows
+from weighbridge.vehicle import Driveline, Provenance, RoadLoad, TorqueModel
 from weighbridge.vehicle.gear import detect_gearings
-from weighbridge.vehicle.model import Driveline, Provenance, RoadLoad, TorqueModel
 
 MASS = 1500.0
 GEARINGS = (40.0, 25.0, 16.0)

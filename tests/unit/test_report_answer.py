@@ -9,7 +9,7 @@ import pytest
 from tests.unit.test_report import MASS, VEHICLE, Elements, make_weighing, written
 
 from weighbridge import Status, Vehicle
-from weighbridge.vehicle.model import Provenance, TorqueModel
+from weighbridge.vehicle import Provenance, TorqueModel
 
 REACH = 1.959963985
 """Standard deviations of half a 95 % interval."""

@@ -24,10 +24,10 @@ from weighbridge import ConfigError, Drive, DriveInfo, Signal, Weighing, compare
 from weighbridge.balance import ForceBalance, ForceTable, Reason
 from weighbridge.customary import shown_in
 from weighbridge.estimators import ESTIMATORS
+from weighbridge.navigation import Motion
 from weighbridge.navigation.geodesy import LocalFrame
-from weighbridge.navigation.motion import Motion
 from weighbridge.report import write_report
-from weighbridge.vehicle.model import Provenance
+from weighbridge.vehicle import Provenance
 
 MASS = 1500.0
 CAR = replace(VEHICLE, provenance=Provenance(mass_scale_std=0.005, method="joint"))

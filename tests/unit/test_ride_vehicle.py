@@ -6,7 +6,7 @@ import pytest
 from tests.noted import error
 
 from weighbridge import ConfigError, Vehicle
-from weighbridge.vehicle.model import Ride
+from weighbridge.vehicle import Ride
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "ride-truck" / "vehicle.toml"
 

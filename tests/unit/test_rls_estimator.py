@@ -9,8 +9,7 @@ import pytest
 from weighbridge import Vehicle
 from weighbridge.estimators.judging import MOTION_STD, consider_std
 from weighbridge.estimators.rls import block_jackknife
-from weighbridge.vehicle.model import Provenance, TorqueModel
-from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
+from weighbridge.vehicle import TORQUE_SOURCES, Provenance, TorqueModel
 
 CAR = Vehicle(
     torque=TorqueModel(source="load", coefficients=(0.0, 900.0)),

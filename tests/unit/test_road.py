@@ -7,7 +7,7 @@ import pytest
 
 from weighbridge import Drive, Signal, Vehicle
 from weighbridge.checks import check_drive
-from weighbridge.vehicle.model import Driveline, Provenance, RoadLoad, TorqueModel
+from weighbridge.vehicle import Driveline, Provenance, RoadLoad, TorqueModel
 
 VAN = Vehicle(kind="van")
 

@@ -10,7 +10,7 @@ from scipy.signal import lfilter
 from weighbridge import Signal
 from weighbridge.balance.shaking import shaken
 from weighbridge.checks import correct_drive
-from weighbridge.navigation.select import find_motion
+from weighbridge.navigation import find_motion
 from weighbridge.simulation import Sensors, make_scenario, simulate_car
 
 pytestmark = pytest.mark.skipif(

@@ -10,7 +10,7 @@ import weighbridge as wb
 from weighbridge import Signal
 from weighbridge.checks import check_drive, correct_drive
 from weighbridge.simulation import make_scenario, simulate_car
-from weighbridge.vehicle.known import Known, describe
+from weighbridge.vehicle import Known, describe
 
 IMU_SIGNALS = tuple(f"{kind}_{axis}" for kind in ("accel", "gyro") for axis in "xyz")
 

@@ -9,7 +9,7 @@ from tests.noted import error
 
 import weighbridge as wb
 from weighbridge import ConfigError, DriveError, Vehicle
-from weighbridge.vehicle.model import Driveline
+from weighbridge.vehicle import Driveline
 
 
 @pytest.mark.parametrize("mass", [1200.0, 1700.0])

@@ -11,7 +11,7 @@ import weighbridge as wb
 from weighbridge import ConfigError, Drive, Signal, Vehicle
 from weighbridge.balance import Reason
 from weighbridge.estimators import ESTIMATORS
-from weighbridge.vehicle.model import Driveline, Provenance
+from weighbridge.vehicle import Driveline, Provenance
 
 SPEED_EKF = wb.CalibrationSettings(method="speed-ekf")
 

@@ -13,9 +13,9 @@ from weighbridge.balance import force_balance
 from weighbridge.constants import GRAVITY
 from weighbridge.estimators.judging import Evidence
 from weighbridge.messages import phrase
-from weighbridge.navigation.select import find_motion
+from weighbridge.navigation import find_motion
 from weighbridge.signals import QUANTITIES
-from weighbridge.vehicle.model import Driveline
+from weighbridge.vehicle import Driveline
 
 TIME = np.arange(0.0, 200.0, 0.25)
 W = 2.0 * np.pi / 40.0

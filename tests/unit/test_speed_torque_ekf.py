@@ -13,7 +13,7 @@ from weighbridge import ConfigError, Drive, Signal, Vehicle
 from weighbridge.balance import Reason
 from weighbridge.estimators import ESTIMATORS, speed_torque_ekf
 from weighbridge.estimators.speed_samples import covered, sampled, span_means
-from weighbridge.vehicle.model import Driveline, RoadLoad, Timing, TorqueModel
+from weighbridge.vehicle import Driveline, RoadLoad, Timing, TorqueModel
 
 METHOD = "speed-torque-ekf"
 MASS = 1400.0

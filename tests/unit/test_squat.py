@@ -21,9 +21,8 @@ from weighbridge.estimators.squat import (
     squat_at,
     squat_by_speed,
 )
+from weighbridge.navigation import find_motion, with_squat
 from weighbridge.navigation.inertial import inertial_motion
-from weighbridge.navigation.motion import with_squat
-from weighbridge.navigation.select import find_motion
 from weighbridge.simulation import (
     MIDSIZE,
     Scenario,
@@ -32,7 +31,7 @@ from weighbridge.simulation import (
     short_route,
     simulate_car,
 )
-from weighbridge.vehicle.classes import VEHICLE_CLASSES
+from weighbridge.vehicle import VEHICLE_CLASSES
 
 joint = ESTIMATORS["joint"]
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from weighbridge import DriveError, Signal
-from weighbridge.navigation.select import find_motion
+from weighbridge.navigation import find_motion
 
 FIXES = ("latitude", "longitude", "altitude")
 LENGTH = 200.0

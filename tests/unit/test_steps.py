@@ -10,7 +10,7 @@ from weighbridge import Signal, Vehicle, weigh
 from weighbridge.checks import check_drive
 from weighbridge.messages import phrase
 from weighbridge.simulation import make_scenario, simulate_car
-from weighbridge.vehicle.model import TorqueModel
+from weighbridge.vehicle import TorqueModel
 
 POUND_FOOT = 9.80665 * 0.45359237 * 0.3048
 

@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 from tests.noted import error, refused
 
 from weighbridge import ConfigError, Drive, Signal, Vehicle
-from weighbridge.vehicle.model import TorqueModel
+from weighbridge.vehicle import TORQUE_SOURCES, TorqueModel
 from weighbridge.vehicle.torque import (
     engine_torque,
     knot_parts,
@@ -15,7 +15,6 @@ from weighbridge.vehicle.torque import (
     rows_of,
     torque_rows,
 )
-from weighbridge.vehicle.torque_sources import air_flow_torque, lowest_load
 
 TIME = np.arange(5.0)
 SPEED = np.array([100.0, 150.0, 200.0, 250.0, 700.0])
@@ -78,12 +77,17 @@ def test_the_reading_of_a_torque_gives_that_torque(curvature):
 
 
 def test_air_flow_torque_by_hand():
+    def found(mass_air_flow=0.0147, engine_speed=150.0, **more):
+        values = {"mass_air_flow": mass_air_flow, "engine_speed": engine_speed, **more}
+        recorded = drive(**{name: [value] * 5 for name, value in values.items()})
+        return torque(recorded, source="air_flow", engine_efficiency=1.0 / 3.0).torque
+
     # 14.7 g/s of air carry 1 g/s of petrol, 45 kW; a third of it at 150 rad/s is 100 N m.
-    assert_allclose(air_flow_torque(np.array([0.0147]), np.array([150.0]), 1.0, 1.0 / 3.0), 100.0)
+    assert_allclose(found(), 100.0)
     # Twice the air for the same petrol.
-    assert_allclose(air_flow_torque(np.array([0.0147]), np.array([150.0]), 2.0, 1.0 / 3.0), 50.0)
+    assert_allclose(found(lambda_1=2.0), 50.0)
     # An engine that stands has no finite torque of flow over speed.
-    assert np.isfinite(air_flow_torque(np.array([0.01]), np.array([0.0]), 1.0, 0.3)).all()
+    assert np.isfinite(found(mass_air_flow=0.01, engine_speed=0.0)).all()
 
 
 def test_columns_of_the_regression():
@@ -93,8 +97,9 @@ def test_columns_of_the_regression():
 
 def test_lowest_load_is_just_above_the_dragged_engine():
     load = np.concatenate((np.full(200, 0.05), np.linspace(0.2, 0.9, 800)))
-    assert lowest_load(load) == pytest.approx(0.06)
-    assert lowest_load(np.array([np.nan])) == 0.0
+    lowest = TORQUE_SOURCES["load"].floor
+    assert lowest(load) == pytest.approx(0.06)
+    assert lowest(np.array([np.nan])) == 0.0
 
 
 @pytest.mark.parametrize("source", ["measured", "percent", "load", "air_flow"])

@@ -9,8 +9,7 @@ from tests.noted import refused, says
 from weighbridge import CalibrationSettings, Drive, DriveError, Signal, Vehicle, calibrate
 from weighbridge.checks import check_drive
 from weighbridge.messages import phrase
-from weighbridge.vehicle.model import Driveline, Provenance, TorqueModel
-from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
+from weighbridge.vehicle import TORQUE_SOURCES, Driveline, Provenance, TorqueModel
 
 SMALL = (42.6, 21.96, 14.04, 9.708, 7.634, 6.315)
 LARGE = (50.5, 25.3, 16.9, 12.7, 9.0, 8.1)

@@ -12,9 +12,7 @@ from hypothesis import strategies as st
 from tests.noted import error
 
 from weighbridge import ConfigError, Vehicle
-from weighbridge.vehicle.file import save_vehicle
-from weighbridge.vehicle.model import (
-    WITNESS_TERMS,
+from weighbridge.vehicle import (
     DraggedReading,
     Driveline,
     Mounting,
@@ -24,6 +22,7 @@ from weighbridge.vehicle.model import (
     SpeedModel,
     Timing,
     TorqueModel,
+    save_vehicle,
 )
 
 positive = st.floats(1e-6, 1e6)
@@ -87,6 +86,15 @@ witness_fields = {
     "lag": maybe(st.floats(-60.0, 60.0)),
     "pressure": maybe(st.floats(1e4, 2e5)),
     "temperature": maybe(st.floats(150.0, 400.0)),
+}
+WITNESS_TERMS = {
+    "mass_air_flow": 4,
+    "absolute_load": 4,
+    "intake_pressure": 4,
+    "fuel_rate": 4,
+    "engine_load": 4,
+    "demanded_torque": 4,
+    "battery_current": 3,
 }
 witnesses = st.sets(st.sampled_from(sorted(WITNESS_TERMS)), max_size=3).flatmap(
     lambda names: st.tuples(

@@ -17,7 +17,7 @@ from weighbridge.balance import force_balance
 from weighbridge.estimators import ESTIMATORS
 from weighbridge.estimators.judging import uncalibrated_std
 from weighbridge.pipeline.weighing import without_mass
-from weighbridge.vehicle.model import Provenance
+from weighbridge.vehicle import Provenance
 
 TRACK_COLUMNS = [
     "time_s", "mass_kg", "std_kg", "used", "speed_mps", "accel_mps2", "specific_force_mps2",

@@ -13,7 +13,7 @@ from weighbridge.balance.second_signal_learning import learn_second_signals
 from weighbridge.checks import check_drive
 from weighbridge.estimators import ESTIMATORS
 from weighbridge.messages import phrase
-from weighbridge.vehicle.model import Driveline, SecondSignalRelation, TorqueModel
+from weighbridge.vehicle import Driveline, SecondSignalRelation, TorqueModel
 
 END = 1500.0
 MIDDLE = 0.5 * END

@@ -11,9 +11,9 @@ from weighbridge.balance.law import force_on_mass
 from weighbridge.balance.table import ForceBalance
 from weighbridge.constants import INDEPENDENT
 from weighbridge.messages import Problem
-from weighbridge.navigation.motion import BY_SPEED
+from weighbridge.navigation import BY_SPEED
 from weighbridge.signals import Bools, Floats
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle import Vehicle
 
 FAST: Final = (2.0, 1.0)
 """Changes over these times are lost where the torque is smoothed, over 3 s or over 1 s [s]."""

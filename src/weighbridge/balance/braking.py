@@ -15,10 +15,11 @@ from weighbridge.balance.instants import SLOWEST_GEARED, behind
 from weighbridge.balance.law import STANDARD_DENSITY, needed_force, rotating_mass
 from weighbridge.balance.table import ForceSetup, ForceTable
 from weighbridge.kernels.interpolation import rows_before
-from weighbridge.navigation.motion import BY_SPEED, Motion, row_before
+from weighbridge.navigation import BY_SPEED, Motion
+from weighbridge.navigation.motion import row_before
 from weighbridge.signals import Bools, Drive, Floats, Signal
+from weighbridge.vehicle import Vehicle
 from weighbridge.vehicle.air import dynamic_pressure
-from weighbridge.vehicle.model import Vehicle
 
 BRAKING_FORCE: Final = 0.06
 """Braking force over weight that marks unseen braking [-]."""

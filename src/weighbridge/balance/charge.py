@@ -22,7 +22,7 @@ from weighbridge.balance.second_signal import (
     rows_of,
 )
 from weighbridge.signals import Drive
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle import Vehicle
 
 
 def in_this_air(drive: Drive, vehicle: Vehicle) -> Vehicle:

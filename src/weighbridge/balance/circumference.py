@@ -10,7 +10,7 @@ import numpy as np
 from weighbridge.balance.gear_fit import FEWEST_RATIOS, held_ratios
 from weighbridge.balance.table import ForceBalance
 from weighbridge.messages import Problem
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle import Vehicle
 
 LEAST: Final = 0.01
 """Smaller changes are wear and pressure [-]: in undamaged drives of seven vehicles of two

@@ -7,7 +7,8 @@ from typing import Final
 
 import numpy as np
 
-from weighbridge.navigation.motion import Motion, nearest_row
+from weighbridge.navigation import Motion
+from weighbridge.navigation.motion import nearest_row
 from weighbridge.signals import Bools, Floats
 
 HARD_CORNERING: Final = 3.0

@@ -13,10 +13,10 @@ from weighbridge.balance.force_balance import force_rows, usable_rows
 from weighbridge.balance.instants import in_band, lagged_motion
 from weighbridge.balance.law import force_on_mass
 from weighbridge.balance.table import ForceBalance
-from weighbridge.navigation.motion import Motion
+from weighbridge.navigation import Motion
 from weighbridge.signals import Drive, Floats
 from weighbridge.signals.correlation import correlation
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle import Vehicle
 from weighbridge.vehicle.torque import source_signal
 
 EARLIEST: Final = -0.4

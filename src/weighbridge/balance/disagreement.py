@@ -23,7 +23,7 @@ from weighbridge.balance.second_signal import (
 )
 from weighbridge.messages import phrase
 from weighbridge.signals import Drive
-from weighbridge.vehicle.model import SecondSignalRelation, Vehicle
+from weighbridge.vehicle import SecondSignalRelation, Vehicle
 
 QUESTIONABLE: Final = 0.05
 """Scale, or level over the reading's range, off by more is questioned [-]."""

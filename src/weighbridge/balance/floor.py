@@ -9,7 +9,7 @@ import numpy as np
 
 from weighbridge.signals import Floats
 from weighbridge.signals.robust import spread
-from weighbridge.vehicle.model import DraggedReading
+from weighbridge.vehicle import DraggedReading
 
 BIN: Final = 1.12
 """Ratio of the engine speeds at the ends of a bin [-]."""

@@ -23,7 +23,7 @@ from weighbridge.balance.foot_setup import (
 )
 from weighbridge.kernels import two_states
 from weighbridge.signals import Bools, Drive, Floats, Signal
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle import Vehicle
 
 USUAL_LAG: Final = 0.3
 """Time constant of the smoothing by which control units report torque and load [s]."""

@@ -12,7 +12,7 @@ import numpy as np
 from weighbridge.balance.floor import FEWEST_IN_BIN, SCATTER, Floor, find_floor
 from weighbridge.signals import Bools, Drive, Floats, Signal
 from weighbridge.signals.robust import spread
-from weighbridge.vehicle.model import DraggedReading, Vehicle
+from weighbridge.vehicle import DraggedReading, Vehicle
 from weighbridge.vehicle.torque import averaged
 
 SLOWING: Final = 0.03

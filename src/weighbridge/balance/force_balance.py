@@ -25,12 +25,12 @@ from weighbridge.balance.instants import (
 )
 from weighbridge.balance.law import needed_force, traction_gain
 from weighbridge.balance.table import ForceBalance, ForceSetup, ForceTable, Reason
-from weighbridge.navigation.motion import BY_SPEED, Motion
+from weighbridge.navigation import BY_SPEED, Motion
 from weighbridge.signals import Bools, Drive, Floats, Signal
 from weighbridge.signals.recent import looking
+from weighbridge.vehicle import DraggedReading, Vehicle
 from weighbridge.vehicle.air import Air, air_density, dynamic_pressure, identify_air
 from weighbridge.vehicle.fuel import Burnt, fuel_burnt, fuel_flow, full_load_torque
-from weighbridge.vehicle.model import DraggedReading, Vehicle
 from weighbridge.vehicle.torque import (
     EXPONENT_STEP,
     Torque,

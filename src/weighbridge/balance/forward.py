@@ -10,9 +10,9 @@ from weighbridge.vehicle.fuel import Burnt
 
 if TYPE_CHECKING:
     from weighbridge.balance.table import ForceSetup, ForceTable
-    from weighbridge.navigation.motion import Motion
+    from weighbridge.navigation import Motion
     from weighbridge.signals import Drive
-    from weighbridge.vehicle.model import Vehicle
+    from weighbridge.vehicle import Vehicle
 
 
 def begin() -> ForceState:

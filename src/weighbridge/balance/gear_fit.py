@@ -10,8 +10,8 @@ from weighbridge.balance.table import ForceBalance
 from weighbridge.constants import CRUISE
 from weighbridge.signals import Floats
 from weighbridge.signals.units import scalar_from_si
+from weighbridge.vehicle import Vehicle
 from weighbridge.vehicle.gear import SLIPS, steady
-from weighbridge.vehicle.model import Vehicle
 
 NEAR: Final = 0.04
 """A ratio this near to a gearing belongs to it [-]: half the distance of close gears."""

@@ -15,7 +15,7 @@ from weighbridge.balance.table import ForceBalance
 from weighbridge.messages import Problem
 from weighbridge.signals import Bools, Floats
 from weighbridge.signals.instants import span
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle import Vehicle
 
 NEAR: Final = 0.02
 """A ratio this near to a gearing lies on it [-]: in simulated drives of four vehicles half of the

@@ -12,7 +12,7 @@ from weighbridge.balance.table import ForceBalance
 from weighbridge.constants import GRAVITY, INDEPENDENT
 from weighbridge.messages import Problem, phrase
 from weighbridge.signals.units import UNITS
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle import Vehicle
 
 STEEPEST: Final = 0.6
 """Force of hills over what heights say, relative to that of acceleration, at least [-]: 0.57 to

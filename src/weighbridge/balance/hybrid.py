@@ -9,11 +9,11 @@ import numpy as np
 from weighbridge.balance.force_balance import highest_torque
 from weighbridge.balance.table import ForceBalance
 from weighbridge.messages import Problem
-from weighbridge.navigation.motion import BY_SPEED
+from weighbridge.navigation import BY_SPEED
 from weighbridge.signals import Bools, Drive
 from weighbridge.signals.runs import marked_runs
+from weighbridge.vehicle import Vehicle
 from weighbridge.vehicle.gear import STANDS
-from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.torque import source_of
 
 IDLE_TORQUE: Final = 0.05

@@ -15,9 +15,11 @@ from weighbridge.constants import GRAVITY
 from weighbridge.kernels.first_order import even_lag
 from weighbridge.kernels.interpolation import mixed, shares
 from weighbridge.kernels.lowpass import lowpass_even
-from weighbridge.navigation.motion import BY_SPEED, Motion, nearest_row, row_before
+from weighbridge.navigation import BY_SPEED, Motion
+from weighbridge.navigation.motion import nearest_row, row_before
 from weighbridge.signals import Bools, Drive, Floats, Ints, Signal
 from weighbridge.signals.runs import marked_runs
+from weighbridge.vehicle import Vehicle
 from weighbridge.vehicle.engine_delay import find_engine_delay
 from weighbridge.vehicle.gear import (
     UNSLIPPED,
@@ -28,7 +30,6 @@ from weighbridge.vehicle.gear import (
     shifting,
     spin_rate,
 )
-from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.torque import source_of
 
 SLOWEST_GEARED: Final = 1.5

@@ -40,8 +40,8 @@ from weighbridge.constants import (
     STANDARD_TEMPERATURE,
 )
 from weighbridge.signals import Floats
+from weighbridge.vehicle import Vehicle
 from weighbridge.vehicle.data_sheet import USUAL_SPEED, wheel_share
-from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.torque import reading_of, rows_of, torque_rows
 
 STANDARD_DENSITY: Final = STANDARD_PRESSURE / (GAS_CONSTANT_DRY_AIR * STANDARD_TEMPERATURE)

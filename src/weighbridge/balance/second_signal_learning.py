@@ -24,7 +24,7 @@ from weighbridge.balance.second_signal import (
 from weighbridge.messages import Problem
 from weighbridge.signals import Drive, Floats
 from weighbridge.signals.robust import robust_fit, spread
-from weighbridge.vehicle.model import SecondSignalRelation, Vehicle
+from weighbridge.vehicle import SecondSignalRelation, Vehicle
 from weighbridge.vehicle.torque import source_of
 
 CLOSED: Final = 0.15

@@ -8,8 +8,8 @@ from typing import Final
 import numpy as np
 
 from weighbridge.messages import Problem
+from weighbridge.navigation import Motion
 from weighbridge.navigation.identify.gain import changes_of_speed
-from weighbridge.navigation.motion import Motion
 from weighbridge.signals import Drive, Floats
 from weighbridge.signals.units import UNITS
 

@@ -13,10 +13,9 @@ from weighbridge.constants import GRAVITY
 from weighbridge.errors import ConfigError
 from weighbridge.kernels import speed_ekf as kernel
 from weighbridge.messages import Problem, refused
-from weighbridge.navigation.motion import Motion
-from weighbridge.navigation.select import find_motion
+from weighbridge.navigation import Motion, find_motion
 from weighbridge.signals import Bools, Drive, Floats
-from weighbridge.vehicle.model import SpeedModel, Vehicle
+from weighbridge.vehicle import SpeedModel, Vehicle
 from weighbridge.vehicle.speed_model import SpeedSampling
 
 SPEEDS: Final = ("vehicle_speed", "gnss_speed")

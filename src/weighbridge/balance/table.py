@@ -14,7 +14,7 @@ from weighbridge.balance.coarse import coarse_note
 from weighbridge.balance.filled import Fill
 from weighbridge.balance.foot_setup import FootSetup
 from weighbridge.messages import Problem
-from weighbridge.navigation.motion import Motion
+from weighbridge.navigation import Motion
 from weighbridge.signals import Bools, Floats, Ints
 from weighbridge.vehicle.air import Air, dynamic_pressure
 

@@ -17,11 +17,11 @@ from weighbridge.balance.law import drag_force
 from weighbridge.balance.table import ForceBalance, ForceTable
 from weighbridge.errors import DriveError
 from weighbridge.messages import Problem, phrase, refused
-from weighbridge.navigation.motion import BY_SPEED, Motion
+from weighbridge.navigation import BY_SPEED, Motion
 from weighbridge.signals import Drive, Floats, Signal
 from weighbridge.signals.interpolation import interpolate
 from weighbridge.signals.robust import median_of_three, median_slope, spread
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle import Vehicle
 from weighbridge.vehicle.torque import source_of
 
 PIECE: Final = 240.0

@@ -27,8 +27,8 @@ from weighbridge.io.write import write_drive, write_frame
 from weighbridge.signals import Drive, DriveInfo
 from weighbridge.signals.shown import plural
 from weighbridge.simulation.simulate import SimulatedDrive, simulate_car
-from weighbridge.vehicle.file import save_vehicle
-from weighbridge.vehicle.known import Described, Known, describe
+from weighbridge.vehicle import Known, describe, save_vehicle
+from weighbridge.vehicle.known import Described
 from weighbridge.version import VERSION
 from weighbridge.whole import whole_folder, write_whole
 

@@ -11,13 +11,12 @@ import polars as pl
 
 from weighbridge.arguments import suggestion
 from weighbridge.benchmark.make import DRIVE_COLUMNS, DRIVES, SHEET, read_csv
-from weighbridge.calibration.run import calibrate
-from weighbridge.calibration.settings import CalibrationSettings
+from weighbridge.calibration import CalibrationSettings, calibrate
 from weighbridge.errors import ConfigError, WeighbridgeError
 from weighbridge.estimators import ESTIMATORS, Status
 from weighbridge.io import read_drive
 from weighbridge.pipeline.weighing import compare, weigh
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle import Vehicle
 
 if TYPE_CHECKING:
     from weighbridge.results.weighing import MassResult

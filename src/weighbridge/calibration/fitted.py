@@ -16,7 +16,8 @@ from weighbridge.messages import Problem as Message
 from weighbridge.messages import refused
 from weighbridge.results.calibration import DelaySearch, FittedRows
 from weighbridge.signals import Floats
-from weighbridge.vehicle.model import EARLIEST_TORQUE, LATEST_TORQUE, DraggedReading, Vehicle
+from weighbridge.vehicle import DraggedReading, Vehicle
+from weighbridge.vehicle.model import EARLIEST_TORQUE, LATEST_TORQUE
 from weighbridge.vehicle.torque import parameters, rows_of
 
 

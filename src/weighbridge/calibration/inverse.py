@@ -29,9 +29,9 @@ from weighbridge.estimators.joint.slow_errors import (
 )
 from weighbridge.estimators.noisy_motion import too_low
 from weighbridge.kernels import disturbance as kernel
-from weighbridge.navigation.motion import Motion
+from weighbridge.navigation import Motion
 from weighbridge.signals import Bools, Floats
-from weighbridge.vehicle.torque_sources import TorqueSource, TorqueTerms
+from weighbridge.vehicle import TorqueSource, TorqueTerms
 
 
 class TooShort(DriveError):

@@ -43,10 +43,10 @@ from weighbridge.estimators.joint.problem import UNMODELLED
 from weighbridge.estimators.track import MassTrack
 from weighbridge.messages import Problem as Message
 from weighbridge.messages import phrase, refused
-from weighbridge.navigation.motion import BY_SPEED
+from weighbridge.navigation import BY_SPEED
 from weighbridge.results.calibration import DelaySearch
 from weighbridge.signals import Floats
-from weighbridge.vehicle.model import Driveline, Provenance, RoadLoad, Timing, Vehicle
+from weighbridge.vehicle import Driveline, Provenance, RoadLoad, Timing, Vehicle
 from weighbridge.vehicle.torque import cold_torque_std
 
 LAGS: Final = (0.0, 0.1, 0.2, 0.3, 0.4)

@@ -11,10 +11,9 @@ from weighbridge.constants import PETROL_HEATING_VALUE
 from weighbridge.errors import ConfigError
 from weighbridge.messages import Problem, phrase, refused
 from weighbridge.signals import Drive
-from weighbridge.vehicle.classes import VEHICLE_CLASSES
+from weighbridge.vehicle import VEHICLE_CLASSES, Vehicle
 from weighbridge.vehicle.data_sheet import scale_std, usual_efficiency
 from weighbridge.vehicle.fuel import SEEN
-from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.torque import source_of
 
 POUND: Final = 0.45359237

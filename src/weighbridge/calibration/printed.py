@@ -19,12 +19,17 @@ from weighbridge.errors import ConfigError
 from weighbridge.kernels.rotation import matrix_to_euler
 from weighbridge.navigation.printed import PrintedFilterSettings, mounting_of, printed_motion
 from weighbridge.signals import Bools, Drive, Floats
-from weighbridge.vehicle.driveline import Mounting, RoadLoad
+from weighbridge.vehicle import (
+    TORQUE_SOURCES,
+    Mounting,
+    Provenance,
+    RoadLoad,
+    Timing,
+    TorqueModel,
+    Vehicle,
+)
 from weighbridge.vehicle.fits import RLS
 from weighbridge.vehicle.gear import detect_gearings
-from weighbridge.vehicle.model import Provenance, Vehicle
-from weighbridge.vehicle.torque_model import Timing, TorqueModel
-from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
 
 GRID: Final = ("grid_drag_area", "grid_rolling", "grid_engine", "grid_wheels")
 """Settings of the grid, in the order of the road parameters."""

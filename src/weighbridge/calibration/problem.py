@@ -20,17 +20,22 @@ from weighbridge.checks import correct_drive, refuse_serious
 from weighbridge.errors import ConfigError
 from weighbridge.estimators.squat import pooled, squat_at
 from weighbridge.messages import refused
-from weighbridge.navigation.motion import BY_SPEED, Motion, with_squat
-from weighbridge.navigation.select import find_motion, without_accelerometer
+from weighbridge.navigation import BY_SPEED, Motion, find_motion, with_squat, without_accelerometer
 from weighbridge.signals import Drive, Floats
+from weighbridge.vehicle import (
+    TORQUE_SOURCES,
+    Driveline,
+    Mounting,
+    TorqueModel,
+    TorqueSource,
+    Vehicle,
+    VehicleClass,
+)
 from weighbridge.vehicle.air import identify_air
 from weighbridge.vehicle.as_read import as_read
-from weighbridge.vehicle.classes import VehicleClass
 from weighbridge.vehicle.engine_delay import find_engine_delay, gathered_delay
 from weighbridge.vehicle.gear import GearDetection, detect_gearings, idling, stepless_range
-from weighbridge.vehicle.model import Driveline, Mounting, TorqueModel, Vehicle
 from weighbridge.vehicle.torque import part_of_a_hybrid, sources_of
-from weighbridge.vehicle.torque_sources import TORQUE_SOURCES, TorqueSource
 
 FEWEST_REPORTED: Final = 10
 """Samples of a gear below which a gear signal may be in error there."""

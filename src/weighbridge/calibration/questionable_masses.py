@@ -14,7 +14,7 @@ from weighbridge.estimators import joint
 from weighbridge.estimators.joint.problem import UNMODELLED
 from weighbridge.messages import Problem, phrase, refused
 from weighbridge.signals import Floats
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle import Vehicle
 from weighbridge.vehicle.torque import source_of
 
 UNCERTAIN: Final = 0.06

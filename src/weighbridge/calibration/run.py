@@ -49,8 +49,8 @@ from weighbridge.pipeline.given import (
 )
 from weighbridge.results.calibration import Calibration
 from weighbridge.signals import Drive
+from weighbridge.vehicle import Driveline, Vehicle
 from weighbridge.vehicle.fits import JOINT, RLS, SPEED_TORQUE_EKF
-from weighbridge.vehicle.model import Driveline, Vehicle
 from weighbridge.vehicle.reported_torque import SAME_REFERENCE, reference_torques
 
 if TYPE_CHECKING:

@@ -21,8 +21,8 @@ from weighbridge.estimators.torque_shape import shape_std
 from weighbridge.estimators.track import MassTrack
 from weighbridge.messages import refused
 from weighbridge.signals import Floats
+from weighbridge.vehicle import Vehicle
 from weighbridge.vehicle.fits import JOINT, SPEED_TORQUE_EKF, Fit
-from weighbridge.vehicle.model import Vehicle
 
 TRANSFER_STD: Final = (0.002, 0.003)
 """What a joint calibration loses on other drives, relative [-]: always, and from each

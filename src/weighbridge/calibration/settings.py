@@ -8,8 +8,8 @@ from numbers import Integral
 from weighbridge.arguments import check_choice, check_flag, check_number, check_text, check_type
 from weighbridge.calibration.printed import TrainingSettings
 from weighbridge.errors import ConfigError
+from weighbridge.vehicle import TORQUE_SOURCES
 from weighbridge.vehicle.fits import FITS, JOINT, RLS, Fit
-from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

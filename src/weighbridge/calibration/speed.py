@@ -19,10 +19,10 @@ from weighbridge.calibration.speed_fit import (
 )
 from weighbridge.messages import Problem as Message
 from weighbridge.messages import refused
-from weighbridge.navigation.select import find_motion
+from weighbridge.navigation import find_motion
 from weighbridge.signals import Drive
+from weighbridge.vehicle import Provenance, SpeedModel, Vehicle
 from weighbridge.vehicle.fits import SPEED_EKF
-from weighbridge.vehicle.model import Provenance, SpeedModel, Vehicle
 from weighbridge.vehicle.speed_model import SpeedSampling
 
 AIR_DENSITY: Final = 1.22

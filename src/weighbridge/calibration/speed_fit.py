@@ -12,7 +12,7 @@ import numpy as np
 from weighbridge.constants import GRAVITY
 from weighbridge.messages import refused
 from weighbridge.signals import Bools, Floats
-from weighbridge.vehicle.model import SpeedModel
+from weighbridge.vehicle import SpeedModel
 
 FEWEST: Final = 40
 """Fewer steps between windows do not settle five coefficients."""

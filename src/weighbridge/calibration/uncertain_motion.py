@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from weighbridge.messages import Problem
-from weighbridge.navigation.motion import Motion
+from weighbridge.navigation import Motion
 
 OPEN: Final = 1.0
 """Part of a gain that may be scale or squat that stays uncertain in every mass [-]. Accelerometers

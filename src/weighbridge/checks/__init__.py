@@ -43,7 +43,7 @@ from weighbridge.signals import Drive, Problem
 from weighbridge.signals.catalogue import REPORTED_LOAD
 from weighbridge.signals.held import without_repeats
 from weighbridge.signals.timeline import one_recording, well_formed
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle import Vehicle
 
 __all__ = ["check_drive", "correct_drive", "refuse_serious"]
 

@@ -16,7 +16,7 @@ from weighbridge.signals.catalogue import IMU_SIGNALS, TABLES
 from weighbridge.signals.cleaning import NO_DRIVE
 from weighbridge.signals.instants import instant, span
 from weighbridge.signals.parts import find_splices
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle import Vehicle
 
 # An inertial sensor with so much between its samples is slow, not in milliseconds [s], where it
 # runs over this part of the time of the speed [-].

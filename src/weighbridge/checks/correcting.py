@@ -12,7 +12,7 @@ from weighbridge.checks.needed import needed, of_torque, show
 from weighbridge.messages import phrase
 from weighbridge.signals import Bools, Drive, Problem, Signal
 from weighbridge.signals.instants import instant
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle import Vehicle
 
 WIDENED: Final = 1.02
 """Load range of a vehicle file over the highest load its drives had [-]."""

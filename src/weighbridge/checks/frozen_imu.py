@@ -13,7 +13,7 @@ from weighbridge.navigation.frozen import frozen_stretches
 from weighbridge.signals import Drive, Problem, Signal
 from weighbridge.signals.catalogue import IMU_SIGNALS
 from weighbridge.signals.instants import instant
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle import Vehicle
 
 _REPORTED: Final = 5.0
 """Frozen for less in all is left out without a word [s]."""

@@ -17,7 +17,7 @@ from weighbridge.navigation.frozen import without_frozen
 from weighbridge.signals import Bools, Drive, Floats, Problem, Signal
 from weighbridge.signals.catalogue import IMU_SIGNALS
 from weighbridge.signals.robust import resolution
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle import Vehicle
 
 # Samples enough for a median; more would only take time.
 _SAMPLES: Final = 20_000

@@ -11,7 +11,7 @@ from weighbridge.checks.needed import needed, show
 from weighbridge.messages import phrase
 from weighbridge.signals import QUANTITIES, Bools, Drive, Problem, Signal
 from weighbridge.signals.instants import instant
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle import Vehicle
 
 FEW: Final = 0.01
 """Part of the values outside their range from which the unit is uncertain, and the mass

@@ -12,7 +12,7 @@ from weighbridge.navigation.frozen import without_frozen
 from weighbridge.signals import Drive, Floats, Problem, Signal
 from weighbridge.signals.catalogue import IMU_SIGNALS
 from weighbridge.signals.instants import span
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle import Vehicle
 
 SECOND: Final = 1.0
 """What an axis reads beside its mean over so long is the shaking [s]."""

@@ -18,8 +18,8 @@ from weighbridge.signals import Drive, Floats, Problem, Signal
 from weighbridge.signals.instants import instant
 from weighbridge.signals.parts import find_splices
 from weighbridge.signals.units import UNITS
+from weighbridge.vehicle import Vehicle
 from weighbridge.vehicle.classes import FASTEST, STRONGEST
-from weighbridge.vehicle.model import Vehicle
 
 _SPEEDS: Final = ("kmh", "mph", "kn", "mps")
 # Unit the name says, unit the numbers are in, as they occur in practice.

@@ -15,7 +15,7 @@ from weighbridge.signals import Drive, Floats, Problem
 from weighbridge.signals.instants import span
 from weighbridge.signals.robust import resolution
 from weighbridge.signals.units import UNITS
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle import Vehicle
 
 SAME: Final = 0.003
 """Steps that differ by less are the same [-]: what is written with few digits."""

@@ -13,7 +13,7 @@ from weighbridge.signals import Bools, Drive, Problem, Signal
 from weighbridge.signals.instants import instant
 from weighbridge.signals.runs import marked_runs
 from weighbridge.signals.words import counted
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle import Vehicle
 
 IN_TURN: Final = 0.1
 """Part of the samples in motion from which jumps are no cuts [-]: wheels that spin as often as a

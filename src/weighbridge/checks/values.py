@@ -10,7 +10,7 @@ import numpy as np
 from weighbridge.checks.needed import MOTION, moves, needed, of_torque, show
 from weighbridge.signals import QUANTITIES, Drive, Problem
 from weighbridge.signals.catalogue import IMU_SIGNALS
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle import Vehicle
 
 _PERCENT: Final = (
     "engine_load",

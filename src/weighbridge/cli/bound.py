@@ -43,7 +43,7 @@ def bound(
     Example: weighbridge bound climb/ --vehicle car.toml --power 60
     """
     from weighbridge.pipeline.speed_bounds import mass_bound
-    from weighbridge.vehicle.model import Vehicle
+    from weighbridge.vehicle import Vehicle
 
     car = Vehicle.load(vehicle)
     chosen = chosen_mapping(car, vehicle, mapping)

@@ -31,11 +31,10 @@ if TYPE_CHECKING:
 
     from rich.table import Table
 
-    from weighbridge.calibration.settings import CalibrationSettings
-    from weighbridge.calibration.speed import SpeedCalibration
+    from weighbridge.calibration import CalibrationSettings, SpeedCalibration
     from weighbridge.results.calibration import Calibration
     from weighbridge.signals import Drive
-    from weighbridge.vehicle.model import Vehicle
+    from weighbridge.vehicle import Vehicle
 
 # Time that reading and fitting take, in weighings of the drive.
 _READING: Final = 0.1
@@ -146,13 +145,11 @@ def calibrate(
     Example: weighbridge calibrate drive-empty/ --mass 1580 -o car.toml
     """
     from weighbridge.arguments import check_choice
-    from weighbridge.calibration.printed import TrainingSettings
+    from weighbridge.calibration import CalibrationSettings, TrainingSettings
     from weighbridge.calibration.questionable_masses import with_findings
-    from weighbridge.calibration.settings import CalibrationSettings
     from weighbridge.estimators.settings import changed, parsed
     from weighbridge.pipeline.given import dbcs_beside, mapping_beside
-    from weighbridge.vehicle.model import Vehicle
-    from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
+    from weighbridge.vehicle import TORQUE_SOURCES, Vehicle
 
     refuse_overwriting(output, force, "vehicle file")
     if torque is not None:
@@ -215,11 +212,7 @@ def _fitted(
     tell: Callable[[int, int], None],
 ) -> tuple[Vehicle, Table, list[str]]:
     """Fit a vehicle; return it, what the terminal shows of it, and notes."""
-    from weighbridge.calibration.run import (
-        run_calibration,
-        run_speed_calibration,
-        run_training,
-    )
+    from weighbridge.calibration import run_calibration, run_speed_calibration, run_training
 
     if settings.grid:
         trained = run_training(recorded, masses, vehicle=base, settings=settings)

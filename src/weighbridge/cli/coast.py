@@ -48,7 +48,7 @@ def coast(
     Example: weighbridge coast run/ --there 10:40 --there 200:230 --back 90:120 --back 300:330
     """
     from weighbridge.pipeline.speed_bounds import coast_down
-    from weighbridge.vehicle.model import Vehicle
+    from weighbridge.vehicle import Vehicle
 
     car = Vehicle.load(vehicle) if vehicle is not None else None
     chosen = chosen_mapping(car, vehicle, mapping)

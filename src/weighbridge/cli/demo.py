@@ -46,7 +46,7 @@ def demo(
     """
     from dataclasses import replace
 
-    from weighbridge.calibration.run import run_calibration
+    from weighbridge.calibration import run_calibration
     from weighbridge.pipeline.weighing import DEFAULT_METHOD, weigh
     from weighbridge.report import write_report
     from weighbridge.simulation import make_scenario, simulate_car

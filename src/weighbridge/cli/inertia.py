@@ -65,7 +65,7 @@ def inertia(
     """
     from weighbridge.estimators.settings import parsed
     from weighbridge.pipeline.inertia import estimate_inertia
-    from weighbridge.vehicle.model import Vehicle
+    from weighbridge.vehicle import Vehicle
 
     changes = parsed(settings or ())
     car = Vehicle.load(vehicle)

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from weighbridge.pipeline.inspection import Inspection, Way
-    from weighbridge.vehicle.model import Vehicle
+    from weighbridge.vehicle import Vehicle
 
 # Width of tables where no terminal gives one.
 _WIDTH = 140
@@ -63,7 +63,7 @@ def inspect(
     Example: weighbridge inspect drive/ --vehicle car.toml
     """
     from weighbridge.pipeline.inspection import inspect_drive
-    from weighbridge.vehicle.model import Vehicle
+    from weighbridge.vehicle import Vehicle
 
     car = Vehicle.load(vehicle) if vehicle is not None else None
     chosen = chosen_mapping(car, vehicle, mapping)
@@ -172,7 +172,8 @@ def _what_lacks(found: Inspection, path: Path, given: _Given) -> list[str]:
 
 def _new_vehicle(found: Inspection, given: _Given, base: Path) -> str:
     """Command that writes the vehicle file of a log, by the torque of its best way."""
-    from weighbridge.vehicle.torque_sources import MEASURED, TORQUE_SOURCES
+    from weighbridge.vehicle import TORQUE_SOURCES
+    from weighbridge.vehicle.torque_sources import MEASURED
 
     source = TORQUE_SOURCES[found.ways[0].torque]
     words = ["weighbridge vehicle new --class", "truck" if _heavy(found) else "car"]
@@ -189,7 +190,7 @@ def _new_vehicle(found: Inspection, given: _Given, base: Path) -> str:
 
 def _other_torque(found: Inspection, car: Vehicle) -> str:
     """Say that a drive has its torque in another way than the vehicle file weighs by."""
-    from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
+    from weighbridge.vehicle import TORQUE_SOURCES
 
     reported, asked = TORQUE_SOURCES[found.ways[0].torque], car.torque.of_source
     remedy = f"make a vehicle file of it: calibrate --torque {reported.name}"

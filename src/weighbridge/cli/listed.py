@@ -41,7 +41,7 @@ class TellsSources(TyperCommand):
 
 def sources() -> str:
     """Each torque source by its name, with what it is."""
-    from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
+    from weighbridge.vehicle import TORQUE_SOURCES
 
     return ", ".join(f"{source.name} ({source.title})" for source in TORQUE_SOURCES.values())
 
@@ -55,14 +55,14 @@ def method_names(incomplete: str) -> list[str]:
 
 def source_names(incomplete: str) -> list[str]:
     """Torque sources that begin so."""
-    from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
+    from weighbridge.vehicle import TORQUE_SOURCES
 
     return _beginning(TORQUE_SOURCES, incomplete)
 
 
 def class_names(incomplete: str) -> list[str]:
     """Vehicle classes that begin so."""
-    from weighbridge.vehicle.classes import VEHICLE_CLASSES
+    from weighbridge.vehicle import VEHICLE_CLASSES
 
     return _beginning(VEHICLE_CLASSES, incomplete)
 
@@ -106,7 +106,7 @@ def slice_names(incomplete: str) -> list[str]:
 
 def source_kinds(incomplete: str) -> list[str]:
     """Kinds of live sources that begin so, with the colon behind them."""
-    from weighbridge.live.sources import SOURCES
+    from weighbridge.live import SOURCES
 
     return _beginning((f"{name}:" for name in SOURCES), incomplete)
 

@@ -34,17 +34,19 @@ from weighbridge.cli.verbosity import notice, quiet
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from weighbridge.live.alerts import Alert
-    from weighbridge.live.keeper import Keeper
-    from weighbridge.live.orders import OrderFile
-    from weighbridge.live.outputs import Output
-    from weighbridge.live.recordings import Recordings
-    from weighbridge.live.scale import LiveScale
-    from weighbridge.live.session import Session
-    from weighbridge.live.source import Source
-    from weighbridge.live.weighing import LiveWeighing
+    from weighbridge.live import (
+        Alert,
+        Keeper,
+        LiveScale,
+        LiveWeighing,
+        OrderFile,
+        Output,
+        Recordings,
+        Session,
+        Source,
+    )
     from weighbridge.signals import DriveInfo
-    from weighbridge.vehicle.model import Vehicle
+    from weighbridge.vehicle import Vehicle
 
 _NO_STATE = "none"
 
@@ -184,13 +186,11 @@ def live(
     import logging
 
     from weighbridge.errors import ConfigError
+    from weighbridge.live import Feed, Outputs, Session
     from weighbridge.live.clock import at_rate
-    from weighbridge.live.feed import Feed
     from weighbridge.live.keys import keys
     from weighbridge.live.orders import orders as order_file
-    from weighbridge.live.outputs import Outputs
-    from weighbridge.live.session import Session
-    from weighbridge.vehicle.model import Vehicle
+    from weighbridge.vehicle import Vehicle
 
     _refuse_options(source, replay, every, ticket, out)
     if record is None and (split_mb is not None or keep_days is not None):
@@ -288,12 +288,12 @@ def _sources(
     listen_only: bool,
 ) -> tuple[list[Source], DriveInfo, float]:
     """Make the sources; return what is known beside their samples, and when they begin [s]."""
-    from weighbridge.live.replay import Replay
+    from weighbridge.live import Replay
     from weighbridge.signals import DriveInfo
 
     if replay is None:
+        from weighbridge.live import parse_source
         from weighbridge.live.clock import now
-        from weighbridge.live.sources import parse_source
 
         made = [
             parse_source(text, dbc=dbc or (), mapping=mapping, listen_only=listen_only)
@@ -349,8 +349,7 @@ def _scale(
     by_host: bool,
 ) -> tuple[LiveScale, Keeper | None]:
     """Go on from the state that was kept, or begin anew."""
-    from weighbridge.live.keeper import Keeper
-    from weighbridge.live.scale import LiveScale
+    from weighbridge.live import Keeper, LiveScale
 
     if state is None:
         return LiveScale(car, lateness=lateness, info=info, step=step), None
@@ -424,7 +423,7 @@ def _address(text: str) -> tuple[str, int]:
 
 
 def _alerts(above: float | None, below: float | None, car: Vehicle) -> list[Alert]:
-    from weighbridge.live.alerts import Alert
+    from weighbridge.live import Alert
 
     above = car.gross if above is None else above
     return [
@@ -436,9 +435,9 @@ def _alerts(above: float | None, below: float | None, car: Vehicle) -> list[Aler
 
 def _run(session: Session, pressed: Callable[[], str], ordered: OrderFile | None) -> LiveWeighing:
     """Weigh until the sources end, somebody says so, or the process is asked to end."""
+    from weighbridge.live import order
     from weighbridge.live.keys import ORDER_OF
     from weighbridge.live.orders import END
-    from weighbridge.live.session import order
 
     stop = Event()
 

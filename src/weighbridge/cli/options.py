@@ -13,7 +13,7 @@ from weighbridge.customary import SYSTEMS
 
 if TYPE_CHECKING:
     from weighbridge.signals import Drive
-    from weighbridge.vehicle.model import Vehicle
+    from weighbridge.vehicle import Vehicle
 
 DrivePaths = Annotated[
     list[Path],

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from weighbridge.messages import Problem
     from weighbridge.pipeline.weighing import Weighing
     from weighbridge.signals import Drive
-    from weighbridge.vehicle.model import Vehicle
+    from weighbridge.vehicle import Vehicle
 
 
 @dataclass(frozen=True)

@@ -28,10 +28,7 @@ from weighbridge.errors import ConfigError, DriveError
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from weighbridge.live.arrival import Arrivals, Need
-    from weighbridge.live.feed import Feed
-    from weighbridge.live.recorder import Recorder
-    from weighbridge.live.recordings import Recordings
+    from weighbridge.live import Arrivals, Feed, Need, Recorder, Recordings
 
 _WAIT: Final = 0.25
 """How long samples are waited for at once [s]."""
@@ -87,13 +84,10 @@ def record(
 
     Example: weighbridge record --source elm:/dev/ttyUSB0 --source gpsd:localhost:2947 -o drive/
     """
-    from weighbridge.live.arrival import needs
-    from weighbridge.live.feed import Feed
-    from weighbridge.live.recorder import Recorder
+    from weighbridge.live import Feed, Recorder, needs, parse_source
     from weighbridge.live.recordings import recordings
-    from weighbridge.live.sources import parse_source
     from weighbridge.signals import DriveInfo
-    from weighbridge.vehicle.model import Vehicle
+    from weighbridge.vehicle import Vehicle
 
     car = Vehicle.load(vehicle) if vehicle is not None else None
     sources = [
@@ -130,7 +124,7 @@ def look(feed: Feed, wanted: tuple[Need, ...], seconds: float) -> None:
     DriveError
         Nothing came at all, and nobody is there to ask.
     """
-    from weighbridge.live.arrival import Arrivals
+    from weighbridge.live import Arrivals
 
     if not seconds:
         return
@@ -181,7 +175,7 @@ def _confirmed(question: str) -> bool:
 
 def run(feed: Feed, recorder: Recorder | Recordings, ended: Callable[[], bool]) -> Arrivals:
     """Record until it is ended, the sources have no more or the disk is full; show how it goes."""
-    from weighbridge.live.arrival import Arrivals
+    from weighbridge.live import Arrivals
 
     arrivals = Arrivals()
     begun = reported = monotonic()

@@ -15,7 +15,7 @@ from weighbridge.cli.terminal import console, say, shown
 from weighbridge.cli.verbosity import say_written
 
 if TYPE_CHECKING:
-    from weighbridge.vehicle.model import Vehicle
+    from weighbridge.vehicle import Vehicle
 
 app = typer.Typer(no_args_is_help=True, help="Write a vehicle file, or explain an existing one.")
 
@@ -138,8 +138,7 @@ def new(
     """
     from weighbridge.pipeline.given import mapping_beside
     from weighbridge.signals.tomlfile import Faults
-    from weighbridge.vehicle.file import save_vehicle
-    from weighbridge.vehicle.known import Known, describe
+    from weighbridge.vehicle import Known, describe, save_vehicle
 
     refuse_results(inputs(mapping=mapping), [Result("--output", output, "vehicle file")])
     refuse_overwriting(output, force, "vehicle file")
@@ -183,7 +182,7 @@ def show(
 
     Example: weighbridge vehicle show car.toml
     """
-    from weighbridge.vehicle.model import Vehicle
+    from weighbridge.vehicle import Vehicle
 
     _print(path, Vehicle.load(path))
 

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from weighbridge.pipeline.weighing import Weighing
     from weighbridge.results.row import WeighingRow
     from weighbridge.signals import Drive
-    from weighbridge.vehicle.model import Vehicle
+    from weighbridge.vehicle import Vehicle
 
 # Width of the table where no terminal gives one: a reason needs room.
 _WIDTH = 160
@@ -126,7 +126,7 @@ def weigh(
     from weighbridge.errors import ConfigError
     from weighbridge.estimators.settings import parsed
     from weighbridge.results.plotjuggler import layout_of
-    from weighbridge.vehicle.model import Vehicle
+    from weighbridge.vehicle import Vehicle
 
     if track is not None and len(drives) > 1:
         raise ConfigError("--track takes one drive; weigh them one by one, or use --json")

@@ -23,8 +23,8 @@ from weighbridge.estimators.settings import changed
 from weighbridge.estimators.track import MassTrack, Segment, Status
 from weighbridge.registry import Registry
 from weighbridge.signals import Drive
+from weighbridge.vehicle import Vehicle
 from weighbridge.vehicle.fits import JOINT, RLS, SPEED_EKF, SPEED_TORQUE_EKF
-from weighbridge.vehicle.model import Vehicle
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -10,7 +10,7 @@ from weighbridge.balance import ForceBalance
 from weighbridge.balance.law import road_columns, torque_columns
 from weighbridge.kernels import disturbance
 from weighbridge.signals import Bools, Floats
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle import Vehicle
 
 UNSEEN: Final = 1e12
 """Factor on the noise of a row that the filter had left out [-]."""

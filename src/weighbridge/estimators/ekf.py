@@ -20,7 +20,7 @@ from weighbridge.estimators.track import MassTrack
 from weighbridge.kernels import mass_ekf as kernel
 from weighbridge.kernels import robust_rls as rls_kernel
 from weighbridge.signals import Bools, Floats
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle import Vehicle
 from weighbridge.vehicle.possible import not_negative, positive
 
 NOISE_SHARE: Final = 0.5

@@ -20,7 +20,7 @@ from weighbridge.estimators.unmeasured_grade import (
     settled_rows,
 )
 from weighbridge.kernels.first_order import first_order
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle import Vehicle
 from weighbridge.vehicle.possible import positive
 
 METHOD = "fathy-events"

@@ -24,7 +24,7 @@ from weighbridge.estimators.track import Status
 from weighbridge.kernels.first_order import fading
 from weighbridge.messages import Problem
 from weighbridge.signals import Bools, Floats, Ints
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle import Vehicle
 
 BIN: Final = 2.5
 """Time over which a slow error counts as one [s]: it is short beside the shortest of

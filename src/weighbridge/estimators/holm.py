@@ -18,7 +18,7 @@ from weighbridge.estimators.unmeasured_grade import (
     settled_rows,
 )
 from weighbridge.kernels import mass_ekf as kernel
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle import Vehicle
 from weighbridge.vehicle.possible import positive
 
 METHOD = "holm-ekf"

@@ -15,7 +15,7 @@ from weighbridge.estimators import ekf, robust_rls
 from weighbridge.estimators.gate import GateSettings
 from weighbridge.estimators.track import MassTrack
 from weighbridge.kernels import hybrid_mass as kernel
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle import Vehicle
 from weighbridge.vehicle.possible import not_negative, positive, within
 
 

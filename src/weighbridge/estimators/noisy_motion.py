@@ -11,9 +11,10 @@ from weighbridge.balance.table import ForceBalance, ForceTable
 from weighbridge.estimators.joint.slow_errors import MOTION_WINDOW_STD, motion_variance
 from weighbridge.estimators.regression import regression
 from weighbridge.messages import Problem
-from weighbridge.navigation.motion import BY_SPEED, noise_level
+from weighbridge.navigation import BY_SPEED
+from weighbridge.navigation.motion import noise_level
 from weighbridge.signals import Bools, Floats
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle import Vehicle
 
 USUAL_STD: Final = 0.5
 """Standard deviation of the variance by the noise of samples, over it [-]: what a window keeps of

@@ -5,7 +5,7 @@ from __future__ import annotations
 from weighbridge.balance.law import force_on_mass, mass_column
 from weighbridge.balance.table import ForceTable
 from weighbridge.signals import Floats
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle import Vehicle
 
 
 def regression(table: ForceTable, vehicle: Vehicle) -> tuple[Floats, Floats]:

@@ -20,7 +20,7 @@ from weighbridge.estimators.unmeasured_grade import (
     settled_rows,
 )
 from weighbridge.signals import Floats
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle import Vehicle
 from weighbridge.vehicle.possible import positive
 
 METHOD = "ritter-batch"

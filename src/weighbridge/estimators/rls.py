@@ -23,7 +23,7 @@ from weighbridge.kernels import rls as kernel
 from weighbridge.navigation.printed import PrintedFilterSettings, mounting_of, printed_motion
 from weighbridge.signals import Bools, Drive, Floats, Ints
 from weighbridge.signals.robust import spread
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle import Vehicle
 
 NOISE_SHARE: Final = 2.0
 """What noise of the motion costs, see `weighbridge.estimators.noisy_motion.row_noise_std` [-]."""

@@ -31,7 +31,7 @@ from weighbridge.estimators.track import MassTrack
 from weighbridge.kernels import robust_rls as kernel
 from weighbridge.signals import Bools, Floats, Ints
 from weighbridge.signals.robust import huber, spread
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle import Vehicle
 from weighbridge.vehicle.possible import not_negative, positive, within
 
 NOISE_SHARE: Final = 0.75

@@ -19,7 +19,7 @@ from weighbridge.estimators.track import MassTrack, Status
 from weighbridge.kernels import speed_ekf as kernel
 from weighbridge.messages import Problem
 from weighbridge.signals import Bools, Floats
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle import Vehicle
 
 TAIL: Final = 0.75
 """Part of the samples, the last, that counts as converged [-]: the paper's filter settles

@@ -13,10 +13,9 @@ from weighbridge.balance import ForceBalance
 from weighbridge.balance.law import squat_column
 from weighbridge.constants import GRAVITY, INDEPENDENT
 from weighbridge.messages import Problem, phrase
-from weighbridge.navigation.motion import BY_SPEED, Motion, with_squat
+from weighbridge.navigation import BY_SPEED, Motion, with_squat
 from weighbridge.signals import Bools, Floats
-from weighbridge.vehicle.classes import VehicleClass
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle import Vehicle, VehicleClass
 
 SQUAT: Final = (0.0035, 0.0025)
 """Pitch of the body per specific force of a vehicle of which nothing is known, and its standard

@@ -16,7 +16,7 @@ from weighbridge.balance.law import traction_gain
 from weighbridge.balance.table import ForceTable
 from weighbridge.estimators.considered import pinned
 from weighbridge.signals import Floats
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle import Vehicle
 
 SHAPE_STD: Final = 0.014
 """Error of the reading beside offset and scale, over the highest torque of the drive [-]: from

@@ -17,7 +17,7 @@ from weighbridge.estimators.gate import GateSettings
 from weighbridge.estimators.judging import consider_std, converged_at, nothing, segments
 from weighbridge.estimators.track import MassTrack
 from weighbridge.signals import Floats, Ints
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle import Vehicle
 from weighbridge.vehicle.possible import not_negative
 
 FEWEST_ROWS = 20

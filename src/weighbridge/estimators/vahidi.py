@@ -19,7 +19,7 @@ from weighbridge.estimators.unmeasured_grade import (
     settled_rows,
 )
 from weighbridge.kernels import multiple_forgetting as kernel
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle import Vehicle
 from weighbridge.vehicle.possible import positive
 
 METHOD = "vahidi-rls"

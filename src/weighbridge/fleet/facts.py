@@ -19,7 +19,7 @@ from weighbridge.fleet.travel import Travel
 from weighbridge.messages import Problem
 from weighbridge.pipeline.weighing import Weighing
 from weighbridge.results.row import WeighingRow
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle import Vehicle
 
 _FIRST: Final = 0.1  # a running mass counts from this standard deviation on [-]
 

@@ -25,7 +25,7 @@ from weighbridge.io.quiet import PARSE_ERRORS, quietly
 from weighbridge.messages import Problem
 from weighbridge.pipeline.given import mapping_beside
 from weighbridge.signals import Drive, Floats
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle import Vehicle
 from weighbridge.whole import whole_file
 
 if TYPE_CHECKING:
@@ -349,7 +349,7 @@ def learn_vehicle(lesson: Lesson) -> dict[str, Any]:
     -------
     A row of `COLUMNS`; nothing is raised for drives that cannot be used
     """
-    from weighbridge.calibration.run import calibrate
+    from weighbridge.calibration import calibrate
 
     car, reported = lesson.assigned.vehicle, []
     weighed = [k for k in lesson.drives if math.isfinite(k.weighed)]

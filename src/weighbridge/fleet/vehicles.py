@@ -18,10 +18,7 @@ from weighbridge.io.paths import partitions
 from weighbridge.messages import Problem, phrase
 from weighbridge.pipeline.given import mapping_of
 from weighbridge.signals import Drive
-from weighbridge.vehicle.classes import VEHICLE_CLASSES
-from weighbridge.vehicle.known import Known, describe
-from weighbridge.vehicle.model import Vehicle
-from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
+from weighbridge.vehicle import TORQUE_SOURCES, VEHICLE_CLASSES, Known, Vehicle, describe
 
 _VEHICLE_KEYS: Final = frozenset(
     ("vehicle", "asset", "truck", "car", "bus", "van", "vin", "device", "unit", "registration",

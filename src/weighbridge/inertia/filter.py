@@ -21,7 +21,7 @@ from weighbridge.inertia.settings import InertiaSettings
 from weighbridge.kernels import inertia as kernel
 from weighbridge.kernels import kalman_bucy
 from weighbridge.signals import Bools, Floats
-from weighbridge.vehicle.model import Ride
+from weighbridge.vehicle import Ride
 
 Method = Literal["kalman-bucy", "inverse", "extended", "printed"]
 METHODS: Final[tuple[Method, ...]] = ("kalman-bucy", "inverse", "extended", "printed")

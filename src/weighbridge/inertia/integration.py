@@ -9,7 +9,7 @@ import numpy as np
 
 from weighbridge.inertia.filter import RideSamples, accelerations, body_noise, push_var
 from weighbridge.signals import Floats
-from weighbridge.vehicle.model import Ride
+from weighbridge.vehicle import Ride
 
 _RIDE_BAND: Final = (0.2, 25.0)
 """Frequencies of a ride, from the heave of a soft suspension to above the hop of an axle [Hz]."""

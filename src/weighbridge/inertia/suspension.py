@@ -19,7 +19,7 @@ from weighbridge.inertia.filter import (
     stiffness,
 )
 from weighbridge.signals import Bools, Floats, Ints
-from weighbridge.vehicle.model import Ride
+from weighbridge.vehicle import Ride
 
 BAND: Final = (0.5, 10.0)
 """Frequencies of the body that are looked at [Hz]: below, offsets drift; above, axles hop and

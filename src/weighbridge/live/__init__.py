@@ -1,1 +1,80 @@
 """Weighing while driving: samples in as they come, a mass out at any time."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from weighbridge.live.alerts import Alert
+    from weighbridge.live.arrival import Arrivals, Need, needs
+    from weighbridge.live.feed import Feed
+    from weighbridge.live.keeper import Keeper
+    from weighbridge.live.orders import OrderFile
+    from weighbridge.live.outputs import Output, Outputs
+    from weighbridge.live.recorder import Recorder
+    from weighbridge.live.recordings import Recordings
+    from weighbridge.live.replay import Replay
+    from weighbridge.live.scale import LiveScale
+    from weighbridge.live.session import Session, order
+    from weighbridge.live.source import Source
+    from weighbridge.live.sources import SOURCES, parse_source
+    from weighbridge.live.weighing import LiveStatus, LiveWeighing
+
+_HOMES = {
+    "SOURCES": "weighbridge.live.sources",
+    "Alert": "weighbridge.live.alerts",
+    "Arrivals": "weighbridge.live.arrival",
+    "Feed": "weighbridge.live.feed",
+    "Keeper": "weighbridge.live.keeper",
+    "LiveScale": "weighbridge.live.scale",
+    "LiveStatus": "weighbridge.live.weighing",
+    "LiveWeighing": "weighbridge.live.weighing",
+    "Need": "weighbridge.live.arrival",
+    "OrderFile": "weighbridge.live.orders",
+    "Output": "weighbridge.live.outputs",
+    "Outputs": "weighbridge.live.outputs",
+    "Recorder": "weighbridge.live.recorder",
+    "Recordings": "weighbridge.live.recordings",
+    "Replay": "weighbridge.live.replay",
+    "Session": "weighbridge.live.session",
+    "Source": "weighbridge.live.source",
+    "needs": "weighbridge.live.arrival",
+    "order": "weighbridge.live.session",
+    "parse_source": "weighbridge.live.sources",
+}
+
+__all__ = [
+    "SOURCES",
+    "Alert",
+    "Arrivals",
+    "Feed",
+    "Keeper",
+    "LiveScale",
+    "LiveStatus",
+    "LiveWeighing",
+    "Need",
+    "OrderFile",
+    "Output",
+    "Outputs",
+    "Recorder",
+    "Recordings",
+    "Replay",
+    "Session",
+    "Source",
+    "needs",
+    "order",
+    "parse_source",
+]
+
+
+def __getattr__(name: str) -> Any:
+    """Import a name of the room when it is first used."""
+    home = _HOMES.get(name)
+    if home is None:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(home), name)
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

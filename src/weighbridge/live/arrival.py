@@ -14,10 +14,10 @@ from weighbridge.live.records import Records
 from weighbridge.live.source import Samples
 from weighbridge.live.weighing import SILENT, SignalHealth
 from weighbridge.signals.catalogue import IMU_SIGNALS
-from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
+from weighbridge.vehicle import TORQUE_SOURCES
 
 if TYPE_CHECKING:
-    from weighbridge.vehicle.model import Vehicle
+    from weighbridge.vehicle import Vehicle
 
 _SPEEDS: Final = (("vehicle_speed",), ("gnss_speed",))
 

@@ -19,7 +19,7 @@ import numpy as np
 from weighbridge.arguments import check_text
 from weighbridge.errors import ConfigError
 from weighbridge.pipeline.forward import ForwardSetup, ForwardState
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle import Vehicle
 
 VERSION: Final = 10
 """Of the layout; another one is refused."""

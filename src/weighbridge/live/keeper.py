@@ -13,7 +13,7 @@ from weighbridge.live.scale import LiveScale
 from weighbridge.signals import DriveInfo
 from weighbridge.signals.instants import instant
 from weighbridge.signals.recent import STEP
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle import Vehicle
 from weighbridge.whole import write_whole
 
 _LOG = logging.getLogger(__name__)

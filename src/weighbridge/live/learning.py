@@ -13,7 +13,7 @@ from weighbridge.pipeline import forward
 from weighbridge.pipeline.forward import ForwardSetup, ForwardState
 from weighbridge.pipeline.weighing import Weighing, weigh
 from weighbridge.signals import Drive
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle import Vehicle
 
 LONGEST: Final = 2700.0
 """No more of it is kept and looked at [s]."""

@@ -12,7 +12,7 @@ from weighbridge.live.on_the_move import time_on_the_move
 from weighbridge.pipeline import forward
 from weighbridge.pipeline.forward import ForwardState
 from weighbridge.signals import Drive
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle import Vehicle
 
 FAR: Final = 3.0
 """The mass on the way and that of all records so far contradict each other beyond so many standard

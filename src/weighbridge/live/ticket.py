@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from typing import Final, NamedTuple
 
-from weighbridge.calibration.run import calibrate
+from weighbridge.calibration import calibrate
 from weighbridge.errors import WeighbridgeError
 from weighbridge.pipeline.weighing import weigh
 from weighbridge.signals import Drive
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle import Vehicle
 
 _WORSE: Final = 1.2
 """A file that leaves so many times as much in every mass is the worse one [-]."""

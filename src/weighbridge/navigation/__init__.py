@@ -1,1 +1,13 @@
 """Speed, specific force and grade from the sensors: of a whole drive, or second by second."""
+
+from weighbridge.navigation.motion import BY_SPEED, Motion, MotionSource, with_squat
+from weighbridge.navigation.select import find_motion, without_accelerometer
+
+__all__ = [
+    "BY_SPEED",
+    "Motion",
+    "MotionSource",
+    "find_motion",
+    "with_squat",
+    "without_accelerometer",
+]

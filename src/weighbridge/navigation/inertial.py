@@ -7,7 +7,7 @@ from weighbridge.navigation.motion import Motion
 from weighbridge.navigation.settings import RATE, NavigationSettings
 from weighbridge.navigation.sources import read_sources
 from weighbridge.signals import Drive
-from weighbridge.vehicle.model import Mounting
+from weighbridge.vehicle import Mounting
 
 
 def inertial_motion(

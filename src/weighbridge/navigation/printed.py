@@ -20,7 +20,7 @@ from weighbridge.kernels.rotation import euler_to_matrix, euler_to_quaternion
 from weighbridge.navigation.aiding import Fixes, Imu, read_fixes, read_imu
 from weighbridge.navigation.motion import Motion, noise_level
 from weighbridge.signals import Drive, Floats, Signal
-from weighbridge.vehicle.driveline import Mounting
+from weighbridge.vehicle import Mounting
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -14,7 +14,7 @@ from weighbridge.navigation.sources import read_sources
 from weighbridge.navigation.speed import speed_motion
 from weighbridge.signals import Drive, Signal
 from weighbridge.signals.catalogue import IMU_SIGNALS
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle import Vehicle
 
 if TYPE_CHECKING:
     from weighbridge.navigation.identify.setup import Setup

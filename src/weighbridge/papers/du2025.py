@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from weighbridge.balance import ForceBalance
-from weighbridge.calibration.run import run_calibration
+from weighbridge.calibration import run_calibration
 from weighbridge.estimators import MassTrack
 from weighbridge.estimators.hybrid import Blend, HybridSettings
 from weighbridge.kernels.hybrid_mass import share_at
@@ -44,8 +44,8 @@ from weighbridge.papers.reproduced import Progress, Reproduced, rms
 from weighbridge.pipeline.weighing import weigh
 from weighbridge.report.table import Table
 from weighbridge.signals import Floats
+from weighbridge.vehicle import Vehicle
 from weighbridge.vehicle.data_sheet import wheel_efficiency
-from weighbridge.vehicle.model import Vehicle
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -6,14 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
 from weighbridge.simulation import Braking, Sensors, make_scenario, simulate_car
-from weighbridge.vehicle.model import (
-    Driveline,
-    Mounting,
-    Provenance,
-    RoadLoad,
-    TorqueModel,
-    Vehicle,
-)
+from weighbridge.vehicle import Driveline, Mounting, Provenance, RoadLoad, TorqueModel, Vehicle
 
 if TYPE_CHECKING:
     from weighbridge.simulation import SimulatedDrive

@@ -24,7 +24,7 @@ from weighbridge.papers.du2025_bus import ROLLING_SPEED, data_sheet
 from weighbridge.papers.du2025_methods import PRINTED
 from weighbridge.papers.point import ACCEL, DENSITY, GRADE, SPEED, point_table
 from weighbridge.signals import Floats
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle import Vehicle
 
 MASS: Final = 10_000.0
 TORQUE: Final = 520.0

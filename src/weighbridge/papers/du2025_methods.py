@@ -12,7 +12,7 @@ from weighbridge.balance import ForceBalance
 from weighbridge.estimators import MassTrack, ekf, hybrid, robust_rls
 from weighbridge.estimators.settings import changed, parsed
 from weighbridge.report.style import BLUE, GREEN, ORANGE
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle import Vehicle
 
 METHODS: Final = ("robust-rls", "ekf", "hybrid")
 

@@ -10,7 +10,7 @@ import numpy as np
 from weighbridge.estimators import MassTrack
 from weighbridge.papers.du2025_running import RunningError
 from weighbridge.signals import Floats
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle import Vehicle
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -13,11 +13,8 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from weighbridge.balance.speed_balance import speed_balance
-from weighbridge.calibration.speed import (
-    SpeedCalibration,
-    calibrate_by_speed,
-    speed_rows,
-)
+from weighbridge.calibration import SpeedCalibration
+from weighbridge.calibration.speed import calibrate_by_speed, speed_rows
 from weighbridge.calibration.speed_fit import Nominal, model_speed
 from weighbridge.estimators.speed_ekf import (
     PRINTED,
@@ -66,7 +63,7 @@ from weighbridge.simulation import (
     Scenario,
     simulate_car,
 )
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle import Vehicle
 from weighbridge.vehicle.speed_model import SpeedSampling
 
 if TYPE_CHECKING:

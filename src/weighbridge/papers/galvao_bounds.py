@@ -17,7 +17,7 @@ from weighbridge.report.table import Table
 from weighbridge.signals import Drive, Floats, Signal
 from weighbridge.signals.units import from_si, to_si
 from weighbridge.simulation import SimulatedDrive
-from weighbridge.vehicle.model import Driveline, RoadLoad, Vehicle
+from weighbridge.vehicle import Driveline, RoadLoad, Vehicle
 
 FULL_POWER: Final = float(np.max(np.multiply(CAR.curve_speed, CAR.curve_torque)))
 """Of the engine by its data sheet; what is lost on the way makes the bound higher [W]."""

@@ -19,7 +19,7 @@ from weighbridge.kernels import speed_ekf as kernel
 from weighbridge.papers.claims import Found, same
 from weighbridge.papers.galvao_drives import NOMINAL
 from weighbridge.signals import Floats
-from weighbridge.vehicle.model import SpeedModel
+from weighbridge.vehicle import SpeedModel
 
 MASS: Final = 1092.0
 SPEED: Final = 16.0

@@ -13,7 +13,7 @@ from weighbridge.estimators.speed_ekf import FilterRun
 from weighbridge.papers.galvao_bounds import SpeedSays
 from weighbridge.papers.galvao_torque import TorqueTrial
 from weighbridge.signals import Floats
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle import Vehicle
 
 LAST: Final = 200
 """Samples over which Table 2 gives the band."""

@@ -8,8 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from weighbridge.calibration.run import run_calibration
-from weighbridge.calibration.settings import CalibrationSettings
+from weighbridge.calibration import CalibrationSettings, run_calibration
 from weighbridge.estimators.speed_torque_ekf import SpeedTorqueSettings
 from weighbridge.papers.claims import Found
 from weighbridge.papers.galvao_drives import CAR, mass_of, scenario, with_grade
@@ -18,7 +17,7 @@ from weighbridge.pipeline.weighing import weigh
 from weighbridge.report.table import Table
 from weighbridge.signals import Drive, Floats
 from weighbridge.simulation import Polling, Route, simulate_car
-from weighbridge.vehicle.model import Driveline, Vehicle
+from weighbridge.vehicle import Driveline, Vehicle
 
 METHOD: Final = "speed-torque-ekf"
 

@@ -40,7 +40,7 @@ from weighbridge.papers.jensen2022_tables import (
 from weighbridge.signals import Floats
 from weighbridge.signals.units import from_si, scalar_from_si, scalar_to_si
 from weighbridge.simulation import MIDSIZE
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle import Vehicle
 
 PEAKS: Final = (0.0, 50.0, 80.0, 110.0)
 """Of the speed in fig. 4 [km/h]."""

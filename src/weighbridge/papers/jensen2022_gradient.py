@@ -10,9 +10,8 @@ from typing import Final
 import numpy as np
 
 from weighbridge.calibration.printed import PrintedCar
-from weighbridge.navigation.motion import Motion
+from weighbridge.navigation import Motion, find_motion
 from weighbridge.navigation.printed import printed_motion
-from weighbridge.navigation.select import find_motion
 from weighbridge.papers.claims import Found
 from weighbridge.papers.jensen2022_drives import CONDITIONS, Conditions, without_weather
 from weighbridge.papers.jensen2022_printed import PrintedSettings
@@ -20,7 +19,7 @@ from weighbridge.report.style import BLUE, GREEN, GREY, VERMILLION, Panel, blank
 from weighbridge.signals import Floats
 from weighbridge.signals.units import from_si, scalar_from_si, scalar_to_si
 from weighbridge.simulation import MIDSIZE, Braking, Route, Scenario, flat_route, simulate_car
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle import Vehicle
 
 LENGTH: Final = 600.0
 """Of the road [m] (sec. 7.2)."""

@@ -11,14 +11,14 @@ import numpy as np
 from weighbridge.balance import ForceBalance
 from weighbridge.balance.law import force_on_mass, mass_column
 from weighbridge.estimators.track import MassTrack
-from weighbridge.navigation.motion import Motion
+from weighbridge.navigation import Motion
 from weighbridge.papers.jensen2022_drives import TestDrive
 from weighbridge.papers.reproduced import rms
 from weighbridge.pipeline.weighing import Weighing
 from weighbridge.signals import Bools, Drive, Floats
 from weighbridge.signals.units import scalar_to_si
 from weighbridge.simulation import SimulatedDrive
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle import Vehicle
 from weighbridge.vehicle.torque_sources import air_flow_torque
 
 BAND: Final = 0.05

@@ -10,14 +10,14 @@ from dataclasses import dataclass
 from typing import Final
 
 from weighbridge.balance import force_balance
-from weighbridge.calibration.printed import PrintedCar, TrainingSettings, calibrate_as_printed
+from weighbridge.calibration import TrainingSettings
+from weighbridge.calibration.printed import PrintedCar, calibrate_as_printed
 from weighbridge.errors import ConfigError
 from weighbridge.estimators.rls import RlsSettings, estimate
 from weighbridge.estimators.track import MassTrack
 from weighbridge.navigation.printed import printed_motion
 from weighbridge.signals import Drive
-from weighbridge.vehicle.driveline import Driveline
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle import Driveline, Vehicle
 
 TYRE_RADIUS: Final = 0.319
 """Outer tyre radius [m] (Table 1)."""

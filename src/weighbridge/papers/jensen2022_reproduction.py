@@ -8,9 +8,8 @@ from typing import Final
 import numpy as np
 
 from weighbridge.balance import ForceBalance
+from weighbridge.calibration import CalibrationSettings, run_calibration
 from weighbridge.calibration.printed import PrintedCar, pulling
-from weighbridge.calibration.run import run_calibration
-from weighbridge.calibration.settings import CalibrationSettings
 from weighbridge.errors import ConfigError
 from weighbridge.estimators.rls import RlsSettings, estimate
 from weighbridge.papers.jensen2022_drives import (
@@ -41,7 +40,7 @@ from weighbridge.pipeline.weighing import weigh
 from weighbridge.results.calibration import Calibration
 from weighbridge.signals import Drive, Floats
 from weighbridge.simulation import MIDSIZE, make_scenario, simulate_car
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle import Vehicle
 
 SEED: Final = 172_000
 """First seed of a reproduction: no choice of the weighing was made on seeds 172000 and up. Tuning

@@ -20,7 +20,7 @@ from weighbridge.results.calibration import Calibration
 from weighbridge.signals import Floats
 from weighbridge.signals.units import scalar_from_si, scalar_to_si
 from weighbridge.simulation import MIDSIZE
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle import Vehicle
 
 PAPER_R_SQUARED: Final = 0.972
 """Of the torque fit (Table 6)."""

@@ -9,7 +9,7 @@ import numpy as np
 from weighbridge.inertia.filter import InertiaTrack
 from weighbridge.signals import Floats
 from weighbridge.simulation.ride import RideSensors, RideVehicle, SimulatedRide
-from weighbridge.vehicle.model import Ride
+from weighbridge.vehicle import Ride
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -9,9 +9,9 @@ import numpy as np
 
 from weighbridge.estimators.gate import GATE
 from weighbridge.estimators.joint.batch import JOINT_MOTION_STD
-from weighbridge.navigation.motion import MotionSource
+from weighbridge.navigation import MotionSource
 from weighbridge.signals import Drive
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle import Vehicle
 
 MOTIONS: Final[dict[MotionSource, str]] = {
     "inertial": "IMU with speed",

@@ -38,7 +38,7 @@ from weighbridge.navigation import forward
 from weighbridge.navigation.select import scaled_for_navigation
 from weighbridge.signals import Drive, Floats
 from weighbridge.signals.recent import STEP, STEPS, instants, recent
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle import Vehicle
 from weighbridge.vehicle.torque import reading_battery
 
 if TYPE_CHECKING:

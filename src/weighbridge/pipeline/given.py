@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, TypeAlias
 from weighbridge.arguments import is_frame, type_name
 from weighbridge.errors import ArgumentTypeError, ConfigError
 from weighbridge.signals import Drive
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle import Vehicle
 
 if TYPE_CHECKING:
     from weighbridge.io.mapping import MappingSource

@@ -59,7 +59,7 @@ from weighbridge.pipeline.given import (
 )
 from weighbridge.results.inertia import TOO_WIDE, InertiaResult, LoadSegment
 from weighbridge.signals import Drive, Floats
-from weighbridge.vehicle.model import Ride, Vehicle
+from weighbridge.vehicle import Ride, Vehicle
 
 DEFAULT_METHOD: Final[Method] = "kalman-bucy"
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from weighbridge.balance.speed_balance import SPEEDS
 from weighbridge.checks import correct_drive
-from weighbridge.navigation.motion import MotionSource
+from weighbridge.navigation import MotionSource
 from weighbridge.pipeline.expected import (
     EXPECTED,
     FAST,
@@ -35,10 +35,9 @@ from weighbridge.signals.catalogue import IMU_SIGNALS
 from weighbridge.signals.robust import resolution
 from weighbridge.signals.shown import in_html, in_lines, plural
 from weighbridge.signals.units import from_si
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle import TORQUE_SOURCES, TorqueSource, Vehicle
 from weighbridge.vehicle.power_balance import find_power_balance
 from weighbridge.vehicle.torque import sources_of
-from weighbridge.vehicle.torque_sources import TORQUE_SOURCES, TorqueSource
 from weighbridge.visible import visible_json
 
 GAP_PERIODS: Final = 5.0

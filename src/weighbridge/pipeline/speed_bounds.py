@@ -19,12 +19,11 @@ from weighbridge.balance.law import rotating_mass
 from weighbridge.constants import GRAVITY
 from weighbridge.errors import ConfigError, DriveError
 from weighbridge.estimators.track import Status
-from weighbridge.navigation.motion import Motion
-from weighbridge.navigation.select import find_motion, without_accelerometer
+from weighbridge.navigation import Motion, find_motion, without_accelerometer
 from weighbridge.signals import Drive, Floats
 from weighbridge.signals.instants import instant
+from weighbridge.vehicle import Vehicle
 from weighbridge.vehicle.air import air_density
-from weighbridge.vehicle.model import Vehicle
 from weighbridge.visible import visible_json
 
 WINDOW: Final = 10.0

@@ -38,8 +38,8 @@ from weighbridge.estimators.judging import lacks_accelerometer
 from weighbridge.estimators.settings import differences
 from weighbridge.estimators.squat import of_vehicle
 from weighbridge.messages import Problem, phrase, refused
-from weighbridge.navigation.motion import BY_SPEED, Motion
-from weighbridge.navigation.select import identify_motion, without_accelerometer
+from weighbridge.navigation import BY_SPEED, Motion, without_accelerometer
+from weighbridge.navigation.select import identify_motion
 from weighbridge.pipeline.given import (
     GivenDrive,
     GivenVehicle,
@@ -65,8 +65,8 @@ from weighbridge.pipeline.notes import (
 )
 from weighbridge.results.weighing import MassResult
 from weighbridge.signals import Drive
+from weighbridge.vehicle import Vehicle
 from weighbridge.vehicle.as_read import as_read
-from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.power_balance import by_power
 from weighbridge.vehicle.torque import source_of
 

@@ -9,7 +9,7 @@ from html import escape
 from typing import TYPE_CHECKING, Final
 
 from weighbridge.estimators import Status
-from weighbridge.navigation.motion import BY_SPEED
+from weighbridge.navigation import BY_SPEED
 from weighbridge.report.style import REACH
 from weighbridge.report.text import (
     between,
@@ -26,7 +26,7 @@ from weighbridge.vehicle.description import can_weigh
 
 if TYPE_CHECKING:
     from weighbridge.results.weighing import MassResult
-    from weighbridge.vehicle.model import Vehicle
+    from weighbridge.vehicle import Vehicle
 
 GRADES: Final = ((0.02, "fine"), (0.05, "good"), (0.10, "fair"), (math.inf, "rough"))
 """Half of the 95 % interval over the mass, up to which an answer is called so [-]."""

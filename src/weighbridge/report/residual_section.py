@@ -20,7 +20,7 @@ from weighbridge.signals.units import from_si
 
 if TYPE_CHECKING:
     from weighbridge.results.weighing import MassResult
-    from weighbridge.vehicle.model import Vehicle
+    from weighbridge.vehicle import Vehicle
 
 POINTS: Final = 600
 """Points of each cloud."""

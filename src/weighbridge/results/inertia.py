@@ -17,7 +17,7 @@ from weighbridge.messages import Explained
 from weighbridge.results.writing import check_level, number, write_track
 from weighbridge.signals import Drive, Floats, Problem
 from weighbridge.signals.shown import in_html, plural
-from weighbridge.vehicle.model import Ride, Vehicle
+from weighbridge.vehicle import Ride, Vehicle
 from weighbridge.visible import visible_json
 
 if TYPE_CHECKING:

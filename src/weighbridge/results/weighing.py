@@ -18,7 +18,7 @@ from weighbridge.results.row import WeighingRow
 from weighbridge.results.writing import check_level, write_track
 from weighbridge.signals import Drive, Problem
 from weighbridge.signals.shown import in_html, in_lines, plural
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle import Vehicle
 
 if TYPE_CHECKING:
     import polars as pl

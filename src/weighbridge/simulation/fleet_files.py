@@ -25,8 +25,7 @@ from weighbridge.simulation.fleet import (
     with_torque_scale,
 )
 from weighbridge.simulation.simulate import SimulatedDrive
-from weighbridge.vehicle.known import Known, describe
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle import Known, Vehicle, describe
 from weighbridge.whole import whole_folder
 
 TRUTH: Final = {

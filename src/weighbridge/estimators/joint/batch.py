@@ -67,11 +67,11 @@ from weighbridge.estimators.squat import ResidualSquat, residual_squat
 from weighbridge.estimators.torque_shape import shape_columns, shape_std
 from weighbridge.estimators.track import MassTrack, Segment
 from weighbridge.kernels import disturbance
-from weighbridge.navigation.motion import BY_SPEED, MotionSource
+from weighbridge.navigation import BY_SPEED, MotionSource
 from weighbridge.signals import Bools, Floats
+from weighbridge.vehicle import Vehicle
 from weighbridge.vehicle.data_sheet import by_data_sheet, scale_std
 from weighbridge.vehicle.fuel import FUEL_STD
-from weighbridge.vehicle.model import Vehicle
 
 BEYOND_STD: Final = 0.015
 """Relative standard deviation of a mass per unit of the logarithm by which it lies beyond

@@ -11,7 +11,7 @@ from weighbridge.estimators.joint.load_stops import loadable
 from weighbridge.estimators.joint.problem import FilterInput
 from weighbridge.kernels import disturbance
 from weighbridge.messages import Problem, phrase
-from weighbridge.navigation.motion import MotionSource
+from weighbridge.navigation import MotionSource
 from weighbridge.signals import Floats
 from weighbridge.signals.instants import instant, span
 

@@ -10,7 +10,7 @@ from weighbridge.constants import GRAVITY
 from weighbridge.estimators.joint.slow_errors import NAMES, prior_std
 from weighbridge.estimators.track import MassTrack
 from weighbridge.messages import Problem
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle import Vehicle
 
 FARTHEST: Final = 8.0
 """Root of the summed squares of slow resistance and drag area, each over its standard deviation

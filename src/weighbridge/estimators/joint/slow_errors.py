@@ -14,13 +14,13 @@ from weighbridge.balance.table import ForceTable
 from weighbridge.constants import GRAVITY
 from weighbridge.estimators.regression import regression
 from weighbridge.kernels.disturbance import DisturbanceParams
-from weighbridge.navigation.motion import BY_SPEED, Motion
+from weighbridge.navigation import BY_SPEED, Motion
 from weighbridge.signals import Bools, Floats
+from weighbridge.vehicle import Vehicle
 from weighbridge.vehicle.data_sheet import (
     by_data_sheet,
     offset_std,
 )
-from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.torque import cold_torque_std
 
 Variance = TypeVar("Variance", float, Floats)

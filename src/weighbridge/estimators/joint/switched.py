@@ -17,7 +17,7 @@ from weighbridge.balance.table import ForceTable
 from weighbridge.estimators.joint.problem import Problem
 from weighbridge.kernels import disturbance, switched
 from weighbridge.signals import Floats
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle import Vehicle
 
 Value = TypeVar("Value", float, Floats)
 

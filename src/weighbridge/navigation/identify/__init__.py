@@ -7,7 +7,7 @@ from weighbridge.navigation.identify.setup import Setup
 from weighbridge.navigation.settings import RATE, NavigationSettings
 from weighbridge.navigation.sources import read_sources
 from weighbridge.signals import Drive
-from weighbridge.vehicle.model import Mounting
+from weighbridge.vehicle import Mounting
 
 __all__ = ["Setup", "identify"]
 

@@ -22,7 +22,7 @@ from weighbridge.navigation.identify.mounting import (
 from weighbridge.navigation.identify.timing import estimate_speed_delay
 from weighbridge.navigation.sources import undelayed, usable
 from weighbridge.signals import Drive, Floats, Signal
-from weighbridge.vehicle.model import Mounting
+from weighbridge.vehicle import Mounting
 
 COARSE_PERIOD: Final = 0.5
 """Clock of the coarse alignment [s]."""

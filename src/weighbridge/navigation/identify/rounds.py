@@ -45,7 +45,7 @@ from weighbridge.navigation.rows import (
 )
 from weighbridge.navigation.settings import NavigationSettings
 from weighbridge.navigation.sources import Sources, undelayed
-from weighbridge.vehicle.model import Mounting
+from weighbridge.vehicle import Mounting
 
 _LOG = logging.getLogger(__name__)
 

@@ -15,7 +15,7 @@ from weighbridge.navigation.rows import Clocks
 from weighbridge.navigation.settings import NavigationSettings
 from weighbridge.navigation.state import State
 from weighbridge.signals import Bools, Floats
-from weighbridge.vehicle.model import Mounting
+from weighbridge.vehicle import Mounting
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
