@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 import weighbridge as wb
-from weighbridge.live.outputs.page import MOST, Page
+from weighbridge.live import Page
+from weighbridge.live.outputs.page import MOST
 from weighbridge.signals.recent import LONGEST_STEP
 
 pytest.importorskip("starlette", reason="starlette is not installed")

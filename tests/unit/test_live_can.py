@@ -12,8 +12,6 @@ from tests.unit.test_stream import truck_rows
 from weighbridge import ConfigError
 from weighbridge.errors import SourceError
 from weighbridge.live import Feed, parse_source
-from weighbridge.live import feed as feed_module
-from weighbridge.live.sources import canbus
 
 can = pytest.importorskip("can")
 
@@ -90,15 +88,16 @@ def test_truck_is_heard_and_nothing_is_sent(bus, request):
 
 
 def test_silent_bus_is_told_and_comes_back(bus, request, monkeypatch, caplog):
-    monkeypatch.setattr(canbus, "SILENT", 0.3)
+    source = parse_source(f"j1939:virtual:{request.node.name}")
+    monkeypatch.setattr(f"{type(source).__module__}.SILENT", 0.3)
     speed = frame(0x18FEF100, "FF 00 32 00 FF FF FF FF")
-    with Feed([parse_source(f"j1939:virtual:{request.node.name}")]) as feed:
+    with Feed([source]) as feed:
         read_until(feed, lambda s: "vehicle_speed" in s, lambda: bus.send(speed))
         read_until(feed, lambda _: not feed.states()[0].connected)
         assert "no frame" in feed.states()[0].error
         read_until(feed, lambda _: feed.states()[0].connected, lambda: bus.send(speed))
         assert feed.states()[0].restarts == 0
-    told = [r for r in caplog.records if r.name == feed_module.__name__]
+    told = [r for r in caplog.records if r.name == Feed.__module__]
     assert len(told) == 2
 
 

@@ -179,7 +179,7 @@ def test_unplugged_and_back(adapter, caplog):
         read_until(feed, lambda s: feed.states()[0].connected and "vehicle_speed" in s)
         assert feed.states()[0].restarts >= 2
         assert feed.states()[0].error == ""
-    told = [r.getMessage() for r in caplog.records if r.name == "weighbridge.live.feed"]
+    told = [r.getMessage() for r in caplog.records if r.name == Feed.__module__]
     assert len(told) == 2
     assert "back" in told[1]
 

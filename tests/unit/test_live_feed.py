@@ -11,7 +11,6 @@ from weighbridge.errors import SourceError
 from weighbridge.live import SOURCES, Feed, parse_source
 from weighbridge.live.clock import now
 from weighbridge.live.device_clock import DeviceClock
-from weighbridge.live.feed import trouble_text
 
 
 def block(k):
@@ -106,21 +105,24 @@ def test_lost_source_is_tried_again_with_growing_pauses(caplog):
 
 
 @pytest.mark.parametrize(
-    ("name", "told"),
+    ("name", "error", "lost", "back"),
     [
-        ("nmea:tcp:127.0.0.1:10110", "nmea 127.0.0.1:10110"),
-        ("elm:/dev/ttyUSB0", "elm /dev/ttyUSB0"),
-        ("script", "script"),
+        ("nmea:tcp:127.0.0.1:10110", "gone", "nmea 127.0.0.1:10110: gone", "nmea 127.0.0.1:10110"),
+        ("nmea:tcp:127.0.0.1:1", "127.0.0.1:1 closed the connection",
+         "nmea: 127.0.0.1:1 closed the connection", "nmea 127.0.0.1:1"),
+        ("elm:/dev/ttyUSB0", "no answer", "elm /dev/ttyUSB0: no answer", "elm /dev/ttyUSB0"),
+        ("lines:udp:5005", "no sample yet", "lines udp:5005: no sample yet", "lines udp:5005"),
+        ("script", "it is gone", "script: it is gone", "script"),
     ],
-)
-def test_a_source_that_is_back_is_called_as_when_it_was_lost(name, told, caplog):
-    source = Script(block(1), SourceError("gone"), block(2), Event())
+)  # fmt: skip
+def test_a_trouble_names_its_source_once_as_when_it_is_back(name, error, lost, back, caplog):
+    source = Script(block(1), SourceError(error), block(2), Event())
     source.name = name
     with Feed([source], pauses=(0.05, 0.1)) as feed:
         limit = time.monotonic() + 3.0
         while len(caplog.records) < 2 and time.monotonic() < limit:
             feed.read(0.02)
-    assert [r.getMessage() for r in caplog.records] == [f"{told}: gone", f"{told} is back"]
+    assert [r.getMessage() for r in caplog.records] == [lost, f"{back} is back"]
 
 
 def test_lost_source_says_why():
@@ -228,17 +230,3 @@ def test_sources_of_the_documentation_can_be_named():
     assert {t.partition(":")[0] for t in named} == set(SOURCES)
     for source in named:
         assert parse_source(source).name == source
-
-
-@pytest.mark.parametrize(
-    ("name", "error", "told"),
-    [
-        ("nmea:tcp:127.0.0.1:1", "127.0.0.1:1 closed the connection",
-         "nmea: 127.0.0.1:1 closed the connection"),
-        ("elm:/dev/ttyUSB0", "no answer", "elm /dev/ttyUSB0: no answer"),
-        ("lines:udp:5005", "no sample yet", "lines udp:5005: no sample yet"),
-        ("made", "it is gone", "made: it is gone"),
-    ],
-)  # fmt: skip
-def test_a_trouble_names_its_source_once(name, error, told):
-    assert trouble_text(name, error) == told

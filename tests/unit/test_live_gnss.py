@@ -12,9 +12,6 @@ import pytest
 from weighbridge import ConfigError
 from weighbridge.io.nmea import UnfitSentenceError, read_sentence
 from weighbridge.live import Feed, parse_source
-from weighbridge.live.sources import gpsd as gpsd_module
-from weighbridge.live.sources import receiver as receiver_module
-from weighbridge.live.sources.gpsd import read_report
 from weighbridge.live.sources.nmea import SentenceReader
 
 
@@ -88,10 +85,11 @@ def test_wrong_checksum():
 
 def test_receiver_in_a_pseudo_terminal(monkeypatch):
     pytest.importorskip("serialx")
-    monkeypatch.setattr(receiver_module, "SILENT", 0.3)
     master, slave = os.openpty()
     tty.setraw(slave)
-    with Feed([parse_source(f"nmea:{os.ttyname(slave)}")]) as feed:
+    source = parse_source(f"nmea:{os.ttyname(slave)}")
+    monkeypatch.setattr(f"{type(source).__module__}.SILENT", 0.3)
+    with Feed([source]) as feed:
         limit = time.monotonic() + 4.0
         found = set()
         k = 0
@@ -148,10 +146,11 @@ TPV = {
 
 
 def test_gpsd_lost_and_back(monkeypatch):
-    monkeypatch.setattr(gpsd_module, "SILENT", 0.3)
     server = Gpsd()
     server.reports = [TPV, {"class": "SKY", "hdop": 0.8}]
-    with Feed([parse_source(f"gpsd:127.0.0.1:{server.port}")], pauses=(0.05, 0.1)) as feed:
+    source = parse_source(f"gpsd:127.0.0.1:{server.port}")
+    monkeypatch.setattr(f"{type(source).__module__}.SILENT", 0.3)
+    with Feed([source], pauses=(0.05, 0.1)) as feed:
         samples = {}
 
         def wait(condition):
@@ -173,15 +172,41 @@ def test_gpsd_lost_and_back(monkeypatch):
     server.thread.join()
 
 
+def heard(reports):
+    """Samples of reports of gpsd."""
+    server = Gpsd()
+    server.reports = reports
+    found, ended = {}, Event()
+
+    def put(block):
+        for name, (times, values) in block.items():
+            kept = found.setdefault(name, ([], []))
+            kept[0].extend(times)
+            kept[1].extend(values)
+        if len(found["gnss_speed"][0]) >= 2:
+            ended.set()
+
+    parse_source(f"gpsd:127.0.0.1:{server.port}").run(put, ended)
+    server.stop.set()
+    server.thread.join()
+    return found
+
+
+def late():
+    """Reports of each 10 ms that come each 20."""
+    for k in range(100):
+        time.sleep(0.02)
+        yield TPV | {"time": f"2026-01-31T17:58:02.{200 + 10 * k:03d}Z"}
+
+
 def test_reports_of_gpsd():
-    stamp, values = read_report(json.dumps(TPV).encode())
-    assert stamp == pytest.approx(1769882282.2)
-    assert values["gnss_speed"] == 13.9
-    assert "altitude" not in read_report(json.dumps(TPV | {"mode": 2}).encode())[1]
-    nothing = (b"", b"{", b"[1]", b'{"class":"TPV","mode":1}', b'{"class":"TPV","lat":"x"}')
-    for line in nothing:
-        assert read_report(line)[1] == {}
-    assert "latitude" not in read_report(json.dumps(TPV | {"lat": None}).encode())[1]
+    found = heard(late())
+    times, speeds = found["gnss_speed"]
+    assert speeds[:2] == [13.9, 13.9]
+    assert times[1] - times[0] == pytest.approx(0.01, abs=1e-5)
+    flat = heard([[1], {"class": "TPV", "mode": 1}, TPV | {"mode": 2}])
+    assert flat.keys() == found.keys() - {"altitude"}
+    assert "latitude" not in heard([TPV | {"lat": None}, TPV | {"lat": "x"}])
 
 
 @pytest.mark.parametrize(

@@ -11,9 +11,7 @@ from tests.noted import error
 
 from weighbridge.errors import SourceError
 from weighbridge.live import Feed
-from weighbridge.live.sources import iio as iio_module
 from weighbridge.live.sources.iio import IioSource
-from weighbridge.live.sources.iio_buffer import UnbufferedError, buffered
 from weighbridge.live.sources.iio_scan import Element, Scan, read_type
 
 AXES = tuple(f"in_{kind}_{axis}" for kind in ("accel", "anglvel") for axis in "xyz")
@@ -202,6 +200,11 @@ def no_gyro(home, imu):
     (imu / "scan_elements/in_anglvel_z_en").unlink()
 
 
+def no_index(home, imu):
+    (imu / "scan_elements/in_temp_en").write_text("1\n")
+    (imu / "scan_elements/in_temp_index").write_text("none\n")
+
+
 def no_trigger(home, imu):
     """All is as it should be, but nothing comes."""
 
@@ -213,13 +216,14 @@ def no_trigger(home, imu):
         (unbuffered, "enable: No such file"),
         (unknown_type, "'le:s16/24>>0'"),
         (no_gyro, "in_anglvel_z_en: No such file"),
+        (no_index, "none"),
         (no_trigger, " 0.3 s"),
     ],
 )
 def test_without_a_buffer_values_are_read_one_by_one(
     tmp_path, imu, caplog, monkeypatch, spoil, why
 ):
-    monkeypatch.setattr(iio_module, "SILENT", 0.3)
+    monkeypatch.setattr(f"{IioSource.__module__}.SILENT", 0.3)
     spoil(tmp_path, imu)
     before = {p: p.read_text() for p in imu.rglob("*") if p.is_file()}
     reading = source(tmp_path)
@@ -229,12 +233,12 @@ def test_without_a_buffer_values_are_read_one_by_one(
         assert samples["accel_x"][1][:5] == pytest.approx([0.007] * 5)
         assert {p: p.read_text() for p in imu.rglob("*") if p.is_file()} == before
     # Once, although it was begun twice.
-    (told,) = [r.getMessage() for r in caplog.records if r.name == iio_module.__name__]
+    (told,) = [r.getMessage() for r in caplog.records if r.name == IioSource.__module__]
     assert why in told
 
 
 def test_a_sensor_that_falls_silent_or_goes_is_lost(tmp_path, imu, monkeypatch):
-    monkeypatch.setattr(iio_module, "SILENT", 0.3)
+    monkeypatch.setattr(f"{IioSource.__module__}.SILENT", 0.3)
     before = settings(imu)
     with (
         Sensor(tmp_path, imu, most=20),
@@ -249,18 +253,6 @@ def test_a_sensor_that_falls_silent_or_goes_is_lost(tmp_path, imu, monkeypatch):
     with pytest.raises(SourceError, match="gone"):
         source(tmp_path).run(lambda _: None, Event())
     gone.join()
-    assert settings(imu) == before
-
-
-def test_a_setting_that_fails_leaves_nothing_set(tmp_path, imu):
-    (imu / "scan_elements/in_temp_en").write_text("1\n")
-    (imu / "scan_elements/in_temp_index").write_text("none\n")
-    before = settings(imu)
-    with (
-        pytest.raises(UnbufferedError, match="none"),
-        buffered(imu, tmp_path / "dev" / "iio:device1", AXES, 100.0),
-    ):
-        pass
     assert settings(imu) == before
 
 

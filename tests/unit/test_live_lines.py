@@ -11,8 +11,7 @@ from tests.noted import error
 from tests.unit.made_weighings import drive, weighing
 
 from weighbridge import ConfigError, WeighbridgeError
-from weighbridge.live import Outputs
-from weighbridge.live.outputs.lines import Lines, json_line
+from weighbridge.live import Lines, Outputs
 
 
 def test_each_line_is_one_weighing_and_is_out_at_once(tmp_path):
@@ -32,8 +31,9 @@ def test_standard_output_gets_lines(capsys):
     assert json.loads(out)["mass_kg"] == 2100.0
 
 
-def test_numbers_that_are_not_finite_and_control_characters_stay_json():
-    line = json_line(weighing(std=math.inf, driven=math.nan, vehicle="a\x7f\x1b\u202eü"))
+def test_numbers_that_are_not_finite_and_control_characters_stay_json(capsys):
+    Lines("-").show(weighing(std=math.inf, driven=math.nan, vehicle="a\x7f\x1b\u202eü"))
+    line = capsys.readouterr().out.removesuffix("\n")
     assert line.isascii()
     assert line.isprintable()
     found = json.loads(line, parse_constant=pytest.fail)
@@ -73,7 +73,7 @@ import resource, signal, sys
 sys.path.insert(0, sys.argv[2])
 from tests.unit.made_weighings import weighing
 from weighbridge.errors import ConfigError
-from weighbridge.live.outputs.lines import Lines
+from weighbridge.live import Lines
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 lines = Lines(sys.argv[1])
 lines.show(weighing())
@@ -89,12 +89,13 @@ lines.show(weighing(mass=1.0))
 
 
 def test_a_full_disk_is_told_and_leaves_whole_lines(tmp_path, pytestconfig):
-    assert len(json_line(weighing())) > 1400
     path = tmp_path / "masses.jsonl"
     words = [sys.executable, "-c", FULL, str(path), str(pytestconfig.rootpath)]
     ran = subprocess.run(words, capture_output=True, text=True, check=True)
     assert str(path) in ran.stdout
-    rows = [json.loads(row) for row in path.read_text().splitlines()]
+    lines = path.read_text().splitlines()
+    assert len(lines[0]) > 1400
+    rows = [json.loads(line) for line in lines]
     assert rows[-1]["mass_kg"] == 1.0
     assert resource.getrlimit(resource.RLIMIT_FSIZE)[0] == resource.RLIM_INFINITY
 

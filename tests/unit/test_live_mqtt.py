@@ -15,9 +15,7 @@ from tests.noted import error
 from tests.unit.made_weighings import drive, weighing
 
 from weighbridge import ConfigError, LiveStatus, WeighbridgeError
-from weighbridge.live import Alert
-from weighbridge.live.outputs.lines import json_line
-from weighbridge.live.outputs.mqtt import Mqtt, Topics, parse_broker, slug
+from weighbridge.live import Alert, Mqtt, parse_broker
 from weighbridge.live.outputs.outbox import Outbox
 from weighbridge.live.weighing import KerbState
 
@@ -193,7 +191,7 @@ def test_the_templates_of_home_assistant_fit_a_weighing(tmp_path):
     rendered = jinja2.Environment(autoescape=False).from_string
 
     def shown(key, w, field="value_template"):
-        return rendered(entities[key][field]).render(value_json=json.loads(json_line(w)))
+        return rendered(entities[key][field]).render(value_json=json.loads(json.dumps(w.to_dict())))
 
     alert = Alert(2050.0)
     alert.look(weighing())
@@ -208,7 +206,7 @@ def test_the_templates_of_home_assistant_fit_a_weighing(tmp_path):
     assert entities["above"]["device_class"] == "problem"
     assert [shown("above", told) for told in (w, replace(w, alerts=()))] == ["ON", "OFF"]
     # 2100 kg with a standard deviation of 25 kg is two of them above.
-    assert json.loads(json_line(w))["alerts"] == [
+    assert w.to_dict()["alerts"] == [
         {
             "side": "above",
             "limit_kg": 2050.0,
@@ -243,7 +241,9 @@ def test_scales_of_vehicles_without_a_name_share_no_topic_and_keep_theirs(tmp_pa
     assert one[0] != other[0]
     assert one[1]["ids"] != other[1]["ids"]
     assert one[1]["name"] != other[1]["name"]
+    assert one[0].startswith("fleet/vehicle-")
     assert node("c", "Truck 7")[0] == "fleet/truck-7/weighing"
+    assert node("d", "Müller's Bus #3/+")[0] == "fleet/muller-s-bus-3/weighing"
 
 
 def test_nothing_is_lost_while_the_broker_restarts_and_the_order_stays(tmp_path, caplog):
@@ -358,20 +358,18 @@ def test_what_is_no_address_is_refused_without_a_password(url):
     assert "pw" not in str(found.value)
 
 
-def test_names_of_vehicles_become_levels_of_topics():
-    assert slug("Müller's Bus #3/+") == "muller-s-bus-3"
-    assert slug("雪") == "vehicle"
-
-
-def test_the_weight_by_vss_is_withdrawn_where_there_is_none():
-    topics = Topics("p", "v")
-    for w in (
-        weighing(status=LiveStatus.INCONSISTENT),
-        weighing(mass=math.nan, std=math.nan),
-        weighing(mass=70_000.0),
-    ):
-        assert topics.messages(w)[1] == ("p/v/Vehicle/CurrentOverallWeight", b"")
-    assert topics.messages(weighing(mass=2100.4))[1][1] == b"2100"
+def test_the_weight_by_vss_is_withdrawn_where_there_is_none(tmp_path):
+    with broker() as port:
+        pass
+    mqtt = sender(port, tmp_path)
+    mqtt.show(weighing(300.0, status=LiveStatus.INCONSISTENT))
+    mqtt.show(weighing(310.0, mass=math.nan, std=math.nan))
+    mqtt.show(weighing(320.0, mass=70_000.0))
+    mqtt.show(weighing(330.0, mass=2100.4))
+    topic = "fleet/delivery-van/Vehicle/CurrentOverallWeight"
+    told = [m.payload for m in mqtt._outbox.after(0, 99) if m.topic == topic]
+    mqtt.close()
+    assert told == [b"", b"", b"", b"2100"]
 
 
 def test_weighings_are_thinned_but_not_a_change_of_status(tmp_path):

@@ -14,7 +14,8 @@ from tests.noted import error, noted
 from tests.unit.made_weighings import NAMES, drive, rests, weighing
 
 from weighbridge import ConfigError
-from weighbridge.live.outputs.page import MOST, WINDOW, History, Page
+from weighbridge.live import Page
+from weighbridge.live.outputs.page import MOST, WINDOW, History
 from weighbridge.live.weighing import AlertState
 
 pytest.importorskip("starlette", reason="starlette is not installed")

@@ -8,7 +8,6 @@ import pytest
 from tests.unit.test_live_gnss import gga, rmc
 
 from weighbridge.live import Feed, parse_source
-from weighbridge.live.sources import receiver as receiver_module
 from weighbridge.live.sources.ubx import UbxReader
 
 pyubx2 = pytest.importorskip("pyubx2")
@@ -127,10 +126,11 @@ def test_sentences_count_where_no_message_comes():
 
 def test_receiver_in_a_pseudo_terminal(monkeypatch):
     pytest.importorskip("serialx")
-    monkeypatch.setattr(receiver_module, "SILENT", 0.4)
     master, slave = os.openpty()
     tty.setraw(slave)
-    with Feed([parse_source(f"ubx:{os.ttyname(slave)}")]) as feed:
+    source = parse_source(f"ubx:{os.ttyname(slave)}")
+    monkeypatch.setattr(f"{type(source).__module__}.SILENT", 0.4)
+    with Feed([source]) as feed:
         limit = time.monotonic() + 5.0
         samples = {}
         k = 0

@@ -1,4 +1,3 @@
-import json
 import math
 from dataclasses import asdict
 
@@ -8,7 +7,6 @@ from hypothesis import strategies as st
 from tests.unit.made_weighings import weighing
 
 from weighbridge.live.outlook import outlook
-from weighbridge.live.outputs.lines import json_line
 
 
 def told(mass, std, floor):
@@ -16,7 +14,7 @@ def told(mass, std, floor):
     found = outlook(mass, std, floor, driven=300.0, reason=None, silent=(), first=60.0)
     said = {k: v for k, v in asdict(found).items() if k not in ("status", "reason", "advice")}
     made = weighing(mass=mass, std=std, **said)
-    return json.loads(json_line(made)), made
+    return made.to_dict(), made
 
 
 @pytest.mark.parametrize(

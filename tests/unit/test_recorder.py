@@ -15,8 +15,7 @@ from tests.noted import error
 from weighbridge import DriveError, DriveInfo, read_drive
 from weighbridge.io import read_table, write_drive
 from weighbridge.io.parts import join_parts, part_files
-from weighbridge.live import Recorder
-from weighbridge.live.recorder import free_folder
+from weighbridge.live import Recorder, Recordings
 
 BEGIN = 1_790_000_000.25
 
@@ -386,10 +385,9 @@ def test_a_recording_goes_on_beside_one_that_is_there(tmp_path):
     """A service that starts again after a power cut keeps what was recorded."""
     asked = tmp_path / "drive"
     for k, name in enumerate(("drive", "drive-2", "drive-3")):
-        folder = free_folder(asked)
-        assert folder == tmp_path / name
-        with Recorder(folder) as recorder:
-            recorder.put(second(k))
+        with Recordings(asked) as recordings:
+            recordings.put(second(k))
+        assert recordings.folders == [tmp_path / name]
     starts = [read_drive(tmp_path / n).info.start_time for n in ("drive", "drive-2", "drive-3")]
     assert len(set(starts)) == 3
 

@@ -391,20 +391,20 @@ def _outputs(
     alerts: Sequence[Alert],
 ) -> list[Output]:
     """Make the outputs that were asked for; the terminal's view begins when all others stand."""
-    from weighbridge.live.outputs.lines import Lines
+    from weighbridge.live import Lines
     from weighbridge.live.outputs.terminal import terminal
 
     made: list[Output] = []
     if json_path is not None:
         made.append(Lines(json_path))
     if mqtt is not None:
-        from weighbridge.live.outputs.mqtt import Mqtt, parse_broker
+        from weighbridge.live import Mqtt, parse_broker
 
         sides = [alert.side for alert in alerts]
         outbox = vehicle.with_suffix(".outbox")
         made.append(Mqtt(parse_broker(mqtt), car.name, outbox, sides=sides))
     if page is not None:
-        from weighbridge.live.outputs.page import Page
+        from weighbridge.live import Page
 
         shown = Page(*_address(page))
         notice(f"page: {shown.name}")

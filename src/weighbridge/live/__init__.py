@@ -12,6 +12,9 @@ if TYPE_CHECKING:
     from weighbridge.live.keeper import Keeper
     from weighbridge.live.orders import OrderFile
     from weighbridge.live.outputs import Output, Outputs
+    from weighbridge.live.outputs.lines import Lines
+    from weighbridge.live.outputs.mqtt import Mqtt, parse_broker
+    from weighbridge.live.outputs.page import Page
     from weighbridge.live.recorder import Recorder
     from weighbridge.live.recordings import Recordings
     from weighbridge.live.replay import Replay
@@ -27,13 +30,16 @@ _HOMES = {
     "Arrivals": "weighbridge.live.arrival",
     "Feed": "weighbridge.live.feed",
     "Keeper": "weighbridge.live.keeper",
+    "Lines": "weighbridge.live.outputs.lines",
     "LiveScale": "weighbridge.live.scale",
     "LiveStatus": "weighbridge.live.weighing",
     "LiveWeighing": "weighbridge.live.weighing",
+    "Mqtt": "weighbridge.live.outputs.mqtt",
     "Need": "weighbridge.live.arrival",
     "OrderFile": "weighbridge.live.orders",
     "Output": "weighbridge.live.outputs",
     "Outputs": "weighbridge.live.outputs",
+    "Page": "weighbridge.live.outputs.page",
     "Recorder": "weighbridge.live.recorder",
     "Recordings": "weighbridge.live.recordings",
     "Replay": "weighbridge.live.replay",
@@ -41,6 +47,7 @@ _HOMES = {
     "Source": "weighbridge.live.source",
     "needs": "weighbridge.live.arrival",
     "order": "weighbridge.live.session",
+    "parse_broker": "weighbridge.live.outputs.mqtt",
     "parse_source": "weighbridge.live.sources",
 }
 
@@ -50,13 +57,16 @@ __all__ = [
     "Arrivals",
     "Feed",
     "Keeper",
+    "Lines",
     "LiveScale",
     "LiveStatus",
     "LiveWeighing",
+    "Mqtt",
     "Need",
     "OrderFile",
     "Output",
     "Outputs",
+    "Page",
     "Recorder",
     "Recordings",
     "Replay",
@@ -64,6 +74,7 @@ __all__ = [
     "Source",
     "needs",
     "order",
+    "parse_broker",
     "parse_source",
 ]
 
