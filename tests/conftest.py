@@ -147,14 +147,14 @@ def foreign_simulator(shared_data: Path) -> Path:
 @pytest.fixture
 def weighbridge(capsys, monkeypatch) -> Callable[..., Ran]:
     """Run the command line in this process, error handling included."""
-    from weighbridge.cli import main
+    from weighbridge import cli
 
     def run(*words: object) -> Ran:
         monkeypatch.setattr(sys, "argv", ["weighbridge", *(str(w) for w in words)])
         capsys.readouterr()
         code = 0
         try:
-            main.run()
+            cli.run()
         except SystemExit as leaving:
             code = leaving.code if isinstance(leaving.code, int) else int(leaving.code is not None)
         return Ran(code, *capsys.readouterr())

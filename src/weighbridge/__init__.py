@@ -20,8 +20,7 @@ if TYPE_CHECKING:
     from weighbridge.calibration import CalibrationSettings, calibrate
     from weighbridge.errors import ConfigError, DriveError, MissingExtraError, WeighbridgeError
     from weighbridge.estimators import Segment, Status
-    from weighbridge.inertia.filter import InertiaFilter
-    from weighbridge.inertia.settings import InertiaSettings
+    from weighbridge.inertia import InertiaFilter, InertiaSettings
     from weighbridge.io import read_drive, read_drives, read_frame, to_frames
     from weighbridge.io.elevation import with_elevation
     from weighbridge.live import LiveScale, LiveStatus, LiveWeighing
@@ -44,8 +43,8 @@ _HOMES = {
     "DriveError": "weighbridge.errors",
     "DriveInfo": "weighbridge.signals",
     "Inertia": "weighbridge.pipeline.inertia",
-    "InertiaFilter": "weighbridge.inertia.filter",
-    "InertiaSettings": "weighbridge.inertia.settings",
+    "InertiaFilter": "weighbridge.inertia",
+    "InertiaSettings": "weighbridge.inertia",
     "LiveScale": "weighbridge.live",
     "LiveStatus": "weighbridge.live",
     "LiveWeighing": "weighbridge.live",

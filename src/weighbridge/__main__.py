@@ -33,7 +33,7 @@ def run() -> None:
     if usual and threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGINT, note)
     try:
-        from weighbridge.cli.main import run as run_commands
+        from weighbridge.cli import run as run_commands
 
         run_commands()
     except KeyboardInterrupt:

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import polars as pl
 import pytest
 
-from weighbridge.cli import main
+from weighbridge import cli
 from weighbridge.simulation import Sensors, make_scenario, simulate_car
 
 TERMINAL = {"TERM": "xterm-256color", "COLUMNS": "90"}
@@ -69,7 +69,7 @@ def car(known, tmp_path_factory) -> Path:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(sys, "argv", ["weighbridge", *words])
         with pytest.raises(SystemExit) as leaving:
-            main.run()
+            cli.run()
     assert leaving.value.code in (0, None)
     return path
 
@@ -127,7 +127,7 @@ def on_a_terminal(weighbridge, monkeypatch):
                 patch.setattr(sys, name, terminal)
             patch.setattr(sys, "argv", ["weighbridge", *map(str, words)])
             with pytest.raises(SystemExit) as leaving:
-                main.run()
+                cli.run()
         reader.join(60.0)
         return leaving.value.code, b"".join(written).decode()
 

@@ -12,9 +12,8 @@ from tests.noted import named
 from website import running
 
 import weighbridge as wb
-from weighbridge import Problem
+from weighbridge import Problem, cli
 from weighbridge.benchmark.plan import CALIBRATIONS, BenchmarkSettings, plan
-from weighbridge.cli import main
 
 TRUCK, BY_SHEET = "truck-imu-50hz-one-1", "truck-imu-50hz-sheet-1"
 OPTIONS = (
@@ -32,7 +31,7 @@ def bench(tmp_path_factory):
             sys, "argv", ["weighbridge", "benchmark", "make", "-o", str(folder), *OPTIONS]
         )
         with pytest.raises(SystemExit) as leaving:
-            main.run()
+            cli.run()
     assert leaving.value.code in (0, None)
     return folder
 

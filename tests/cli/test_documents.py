@@ -10,7 +10,7 @@ from tests.graded import climb, coasting
 from typer.main import get_command
 from website import running
 
-from weighbridge.cli.main import app
+from weighbridge.cli import app
 from weighbridge.io import write_drive
 from weighbridge.simulation import make_scenario, simulate_car
 from weighbridge.simulation.ride import RideScenario, simulate_ride

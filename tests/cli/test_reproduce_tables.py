@@ -2,13 +2,12 @@
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 from tests.noted import named
 
-from weighbridge.papers import Item, Reproduced, seed_of
-from weighbridge.papers.claims import Found
-from weighbridge.report.table import Table
+from weighbridge.papers import Found, Item, Reproduced, seed_of
 
 LONG = "as in the paper, half-load, seed 777"
 HEADS = ("drive", "true kg", "robust-rls %", "ekf %", "hybrid %", "RMSE robust-rls", "RMSE ekf",
@@ -29,7 +28,7 @@ def made(*rows):
     return Reproduced(
         title="A paper",
         note="seeds 5 to 6",
-        tables=(Table("Drives", HEADS, (ROW,)),),
+        tables=(SimpleNamespace(title="Drives", columns=HEADS, rows=(ROW,), marked=()),),
         rows=rows or (row(agrees=True),),
         write_page=lambda tables, path: None,
     )

@@ -13,7 +13,7 @@ from tests.cli.conftest import TERMINAL, written_to
 from tests.cli.test_terminal import RUN
 from tests.noted import named
 
-from weighbridge.cli.main import app
+from weighbridge.cli import app
 from weighbridge.cli.progress import Bar, compiling, time_text
 
 COLOUR = re.compile(r"\x1b\[(?:\d+;)*(?:3[0-7]|38;|9[0-7])")

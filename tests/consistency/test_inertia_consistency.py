@@ -5,8 +5,8 @@ import pytest
 from scipy.stats import chi2
 
 from weighbridge import InertiaSettings
+from weighbridge.inertia import ride_samples
 from weighbridge.inertia.filter import run_filter
-from weighbridge.inertia.ride_checks import ride_samples
 from weighbridge.papers.nguyen2024 import suspension_of
 from weighbridge.simulation.ride import TRUCK, RideScenario, RideSensors, simulate_ride
 

@@ -7,7 +7,7 @@ import pytest
 import typer.main
 from website.links import HOME
 
-from weighbridge.cli.main import app
+from weighbridge.cli import app
 
 PLACES = (
     "docs/raspberry.md",

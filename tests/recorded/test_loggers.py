@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from weighbridge.cli import main
+from weighbridge import cli
 
 HOME = Path(__file__).parents[2]
 PAGE = (HOME / "docs" / "loggers.md").read_text(encoding="utf-8")
@@ -41,7 +41,7 @@ def run(command, capsys, monkeypatch):
     monkeypatch.setattr(sys, "argv", shlex.split(command))
     capsys.readouterr()
     try:
-        main.run()
+        cli.run()
     except SystemExit as leaving:
         return leaving.code or 0, "".join(capsys.readouterr())
     return 0, "".join(capsys.readouterr())

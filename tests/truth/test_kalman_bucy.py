@@ -7,7 +7,8 @@ from scipy.integrate import cumulative_trapezoid, solve_ivp
 from scipy.stats import truncnorm
 
 from weighbridge import InertiaFilter, InertiaSettings
-from weighbridge.inertia.filter import RideSamples, fixed_params, run_filter
+from weighbridge.inertia import RideSamples
+from weighbridge.inertia.filter import fixed_params, run_filter
 from weighbridge.kernels import inertia as kernel
 from weighbridge.kernels import kalman_bucy
 from weighbridge.papers.nguyen2024 import suspension_of

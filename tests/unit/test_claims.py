@@ -13,6 +13,11 @@ from weighbridge import ConfigError
 from weighbridge.estimators.settings import changed, differences, parsed
 from weighbridge.papers import (
     PAPERS,
+    Found,
+    Item,
+    Section,
+    Verdict,
+    document,
     du2025,
     galvao,
     galvao_figures,
@@ -23,16 +28,7 @@ from weighbridge.papers import (
     nguyen2024,
     settings_of,
 )
-from weighbridge.papers.claims import (
-    EXACT,
-    Conditions,
-    Found,
-    Item,
-    Section,
-    Verdict,
-    document,
-    same,
-)
+from weighbridge.papers.claims import EXACT, Conditions, same
 from weighbridge.papers.jensen2022_drives import without_weather
 from weighbridge.simulation import make_scenario, simulate_car
 

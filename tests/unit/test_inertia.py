@@ -20,9 +20,9 @@ from weighbridge import (
     estimate_inertia,
     read_drive,
 )
-from weighbridge.inertia.filter import RideSamples, inverse_interval, run_filter
+from weighbridge.inertia import RideSamples, ride_samples
+from weighbridge.inertia.filter import inverse_interval, run_filter
 from weighbridge.inertia.integration import integration_std
-from weighbridge.inertia.ride_checks import ride_samples
 from weighbridge.inertia.suspension import check_suspension
 from weighbridge.papers.nguyen2024 import suspension_of
 from weighbridge.simulation.ride import TRUCK, RideScenario, RideSensors, simulate_ride

@@ -13,8 +13,7 @@ from weighbridge import ConfigError
 from weighbridge.calibration.grid import TABLE_5
 from weighbridge.calibration.printed import pulling
 from weighbridge.estimators.rls import RlsSettings, estimate, run_in_turn
-from weighbridge.papers import jensen2022, jensen2022_reproduction, seed_of, settings_of
-from weighbridge.papers.claims import document
+from weighbridge.papers import document, jensen2022, jensen2022_reproduction, seed_of, settings_of
 from weighbridge.papers.jensen2022_drives import (
     HIGHWAY_LIMIT,
     HIGHWAY_TRIPS,

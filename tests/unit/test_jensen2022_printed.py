@@ -15,7 +15,8 @@ from weighbridge.estimators.rls import RlsSettings, parameters
 from weighbridge.kernels import ins_printed as kernel
 from weighbridge.kernels import rls
 from weighbridge.kernels.rotation import euler_to_quaternion
-from weighbridge.navigation.printed import PrintedFilterSettings, level_mounting
+from weighbridge.navigation import PrintedFilterSettings
+from weighbridge.navigation.printed import level_mounting
 from weighbridge.papers.jensen2022_printed import (
     PrintedSettings,
     train,

@@ -4,11 +4,13 @@ import numpy as np
 from tests.noted import error
 
 from weighbridge import Drive, DriveError, Problem, Signal
-from weighbridge.inertia.ride_checks import NEEDED, ride_samples
+from weighbridge.inertia import ride_samples
+from weighbridge.simulation.ride import RideScenario, simulate_ride
 
 
 def test_a_clock_that_left_one_row_is_told_by_its_cause():
-    signals = {name: Signal(name, np.zeros(1), np.zeros(1)) for name in NEEDED}
+    made = simulate_ride(RideScenario(duration=3.0, seed=3)).drive
+    signals = {name: Signal(name, np.zeros(1), np.zeros(1)) for name in made.signals}
     reversed_clock = Problem.of(
         "clock.backwards", source="ride.csv", back="1 s", at="2 s", lost=99, rows=100
     )

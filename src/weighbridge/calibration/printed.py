@@ -17,7 +17,7 @@ from weighbridge.calibration.recording import Recording
 from weighbridge.calibration.regression import TorqueRows, build_rows, fit
 from weighbridge.errors import ConfigError
 from weighbridge.kernels.rotation import matrix_to_euler
-from weighbridge.navigation.printed import PrintedFilterSettings, mounting_of, printed_motion
+from weighbridge.navigation import PrintedFilterSettings, mounting_of, printed_motion
 from weighbridge.signals import Bools, Drive, Floats
 from weighbridge.vehicle import (
     TORQUE_SOURCES,

@@ -85,7 +85,7 @@ def effect_names(incomplete: str) -> list[str]:
 
 def filter_names(incomplete: str) -> list[str]:
     """Filters of the ride that begin so."""
-    from weighbridge.inertia.filter import METHODS
+    from weighbridge.inertia import METHODS
 
     return _beginning(METHODS, incomplete)
 

@@ -16,8 +16,7 @@ from weighbridge.cli.terminal import complain, console, say
 from weighbridge.cli.verbosity import say_written
 
 if TYPE_CHECKING:
-    from weighbridge.papers import Reproduced
-    from weighbridge.papers.claims import Section
+    from weighbridge.papers import Reproduced, Section
 
 
 def reproduce(
@@ -146,7 +145,7 @@ def _pages(report: Path | None, names: list[str], *, every: bool) -> dict[str, P
 
 def _write_items(report: Path, sections: list[Section]) -> None:
     """Write every item of the papers that have records, as Markdown or as a page."""
-    from weighbridge.papers.claims import document
+    from weighbridge.papers import document
     from weighbridge.report.study import write_study
     from weighbridge.whole import write_whole
 

@@ -20,7 +20,7 @@ from weighbridge.estimators.judging import consider_std, converged_at, segments
 from weighbridge.estimators.regression import regression
 from weighbridge.estimators.track import MassTrack
 from weighbridge.kernels import rls as kernel
-from weighbridge.navigation.printed import PrintedFilterSettings, mounting_of, printed_motion
+from weighbridge.navigation import PrintedFilterSettings, mounting_of, printed_motion
 from weighbridge.signals import Bools, Drive, Floats, Ints
 from weighbridge.signals.robust import spread
 from weighbridge.vehicle import Vehicle

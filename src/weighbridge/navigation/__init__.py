@@ -1,13 +1,17 @@
 """Speed, specific force and grade from the sensors: of a whole drive, or second by second."""
 
 from weighbridge.navigation.motion import BY_SPEED, Motion, MotionSource, with_squat
+from weighbridge.navigation.printed import PrintedFilterSettings, mounting_of, printed_motion
 from weighbridge.navigation.select import find_motion, without_accelerometer
 
 __all__ = [
     "BY_SPEED",
     "Motion",
     "MotionSource",
+    "PrintedFilterSettings",
     "find_motion",
+    "mounting_of",
+    "printed_motion",
     "with_squat",
     "without_accelerometer",
 ]

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from importlib import import_module
 from typing import Any, Final
 
-from weighbridge.papers.claims import Item, Row, Verdict
+from weighbridge.papers.claims import Found, Item, Row, Section, Verdict, document
 from weighbridge.papers.reproduced import Progress, Reproduced
 
 PAPERS: Final[dict[str, str]] = {
@@ -49,11 +49,14 @@ def settings_of(name: str) -> Any:
 
 __all__ = [
     "PAPERS",
+    "Found",
     "Item",
     "Progress",
     "Reproduced",
     "Row",
+    "Section",
     "Verdict",
+    "document",
     "items_of",
     "paper",
     "seed_of",

@@ -30,7 +30,7 @@ from weighbridge.kernels.rotation import (
     euler_to_quaternion,
     quaternion_to_matrix,
 )
-from weighbridge.navigation.printed import PrintedFilterSettings
+from weighbridge.navigation import PrintedFilterSettings
 from weighbridge.papers.claims import Found, same
 from weighbridge.papers.jensen2022_printed import PrintedSettings
 from weighbridge.papers.point import ACCEL, DENSITY, GRADE, SPEED, point_table

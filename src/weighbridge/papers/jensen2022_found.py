@@ -12,7 +12,7 @@ from scipy.stats import gaussian_kde
 
 from weighbridge.calibration.grid import TABLE_5
 from weighbridge.estimators.rls import RlsSettings, run_in_turn
-from weighbridge.navigation.printed import PrintedFilterSettings
+from weighbridge.navigation import PrintedFilterSettings
 from weighbridge.papers.claims import Found, same
 from weighbridge.papers.jensen2022_drives import TABLE_B1
 from weighbridge.papers.jensen2022_equations import equations

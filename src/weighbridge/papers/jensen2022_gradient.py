@@ -10,8 +10,7 @@ from typing import Final
 import numpy as np
 
 from weighbridge.calibration.printed import PrintedCar
-from weighbridge.navigation import Motion, find_motion
-from weighbridge.navigation.printed import printed_motion
+from weighbridge.navigation import Motion, find_motion, printed_motion
 from weighbridge.papers.claims import Found
 from weighbridge.papers.jensen2022_drives import CONDITIONS, Conditions, without_weather
 from weighbridge.papers.jensen2022_printed import PrintedSettings

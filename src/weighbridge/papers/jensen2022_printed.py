@@ -15,7 +15,7 @@ from weighbridge.calibration.printed import PrintedCar, calibrate_as_printed
 from weighbridge.errors import ConfigError
 from weighbridge.estimators.rls import RlsSettings, estimate
 from weighbridge.estimators.track import MassTrack
-from weighbridge.navigation.printed import printed_motion
+from weighbridge.navigation import printed_motion
 from weighbridge.signals import Drive
 from weighbridge.vehicle import Driveline, Vehicle
 

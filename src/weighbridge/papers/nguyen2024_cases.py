@@ -6,8 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from weighbridge.errors import ConfigError
-from weighbridge.inertia.filter import Method
-from weighbridge.inertia.settings import InertiaSettings
+from weighbridge.inertia import InertiaSettings, Method
 from weighbridge.simulation.ride import RideSensors
 from weighbridge.vehicle.possible import positive
 

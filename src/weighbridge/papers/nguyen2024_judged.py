@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from weighbridge.inertia.filter import InertiaTrack
+from weighbridge.inertia import InertiaTrack
 from weighbridge.signals import Floats
 from weighbridge.simulation.ride import RideSensors, RideVehicle, SimulatedRide
 from weighbridge.vehicle import Ride

@@ -17,14 +17,19 @@ from weighbridge.constants import GRAVITY
 from weighbridge.errors import ConfigError
 from weighbridge.estimators.settings import changed, differences
 from weighbridge.estimators.track import Status
-from weighbridge.inertia.filter import (
+from weighbridge.inertia import (
     AXES,
     METHODS,
+    PARTS,
+    UNKNOWN_FORCE_STD,
+    InertiaSettings,
     InertiaTrack,
     Method,
     RideSamples,
-    estimate,
+    SuspensionCheck,
+    ride_samples,
 )
+from weighbridge.inertia.filter import estimate
 from weighbridge.inertia.integration import integration_std
 from weighbridge.inertia.load_changes import believed_otherwise, jumps, load_changes
 from weighbridge.inertia.ride_checks import (
@@ -35,13 +40,9 @@ from weighbridge.inertia.ride_checks import (
     check_signals,
     nothing_moves,
     ride_of,
-    ride_samples,
 )
-from weighbridge.inertia.settings import UNKNOWN_FORCE_STD, InertiaSettings
 from weighbridge.inertia.suspension import (
-    PARTS,
     SHORTEST,
-    SuspensionCheck,
     attenuation,
     body_tilt,
     check_suspension,

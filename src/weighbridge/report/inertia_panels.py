@@ -10,9 +10,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from weighbridge.estimators import Status
-from weighbridge.inertia.filter import AXES, InertiaTrack
-from weighbridge.inertia.settings import UNKNOWN_FORCE_STD
-from weighbridge.inertia.suspension import PARTS, SuspensionCheck
+from weighbridge.inertia import AXES, PARTS, UNKNOWN_FORCE_STD, InertiaTrack, SuspensionCheck
 from weighbridge.report.answer import Answer, answer_block, grade, no_answer_block
 from weighbridge.report.markup import remarks
 from weighbridge.report.study import write_study
