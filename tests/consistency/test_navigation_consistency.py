@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from weighbridge.navigation.inertial import inertial_motion
+from weighbridge.navigation import find_motion
 from weighbridge.simulation import Sensors, make_scenario, simulate_car
 
 SEEDS = range(401, 407)
@@ -21,7 +21,7 @@ def errors():
     for seed in SEEDS:
         scenario = make_scenario("car-short", payload=100.0, seed=seed)
         made = simulate_car(replace(scenario, sensors=Sensors(imu_rate=50.0)))
-        motion, truth = inertial_motion(made.drive), made.truth
+        motion, truth = find_motion(made.drive), made.truth
         at = np.searchsorted(motion.time, np.arange(APART, made.drive.duration - APART, APART))
         true = np.interp(motion.time[at], truth.time, truth.grade)
         grade.append((motion.grade[at] - true) / motion.grade_std[at])

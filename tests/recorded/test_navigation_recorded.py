@@ -8,8 +8,7 @@ import pytest
 from numba import config
 
 from weighbridge.constants import GRAVITY
-from weighbridge.navigation.inertial import inertial_motion
-from weighbridge.navigation.settings import NavigationSettings
+from weighbridge.navigation import find_motion
 
 pytestmark = pytest.mark.skipif(
     bool(config.DISABLE_JIT), reason="a whole drive takes minutes without the compiler"
@@ -28,7 +27,7 @@ def test_highway_minute_of_a_phone(shared_data, raw_gyro, gnss_cut):
     drive, time, pitch, _ = study.load_comma(
         shared_data / "comma2k19", raw_gyro=raw_gyro, gnss_cut=gnss_cut
     )
-    motion = inertial_motion(drive)
+    motion = find_motion(drive)
     _, std = study.score(motion, time, pitch, "pitch")
     assert std <= 0.15
     # the speed of the wheels reads 0.991 of the true speed
@@ -38,7 +37,7 @@ def test_highway_minute_of_a_phone(shared_data, raw_gyro, gnss_cut):
 @pytest.mark.parametrize("seed", [0, 1, 2, 3])
 def test_hills_with_noisy_fixes(shared_data, seed):
     drive, time, grade = study.load_rtk(shared_data / "rtk-grade", seed=seed)
-    motion = inertial_motion(drive)
+    motion = find_motion(drive)
     mean, std = study.score(motion, time - motion.speed_delay, grade, "grade")
     assert std <= 0.40
     assert abs(mean) <= 0.15
@@ -50,7 +49,7 @@ def test_hills_with_noisy_fixes(shared_data, seed):
 def test_a_car_squats_on_hills_as_it_does_by_accelerating(shared_data):
     """Pitch of the body by the sensors, grade by heights good to centimetres."""
     drive, time, grade = study.load_rtk(shared_data / "rtk-grade", noise=0.02)
-    motion = inertial_motion(drive)
+    motion = find_motion(drive)
     known = np.isfinite(grade)
     at = motion.time + motion.speed_delay
     road = np.interp(at, time[known], grade[known])
@@ -71,10 +70,3 @@ def test_a_car_squats_on_hills_as_it_does_by_accelerating(shared_data):
     assert squat[1] > 4.0 * np.sqrt(cov[1, 1])
     off = np.array([1.0, -1.0])
     assert abs(squat[0] - squat[1]) < 3.0 * np.sqrt(off @ cov[:2, :2] @ off)
-
-
-def test_forward_pass_alone(shared_data):
-    drive, time, grade = study.load_rtk(shared_data / "rtk-grade", seed=5)
-    motion = inertial_motion(drive, settings=NavigationSettings(smooth=False))
-    _, std = study.score(motion, time - motion.speed_delay, grade, "grade", skip=60.0)
-    assert std <= 0.45

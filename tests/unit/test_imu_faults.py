@@ -10,9 +10,9 @@ from scipy.ndimage import gaussian_filter1d
 from scipy.signal import lfilter
 from tests.noted import refused
 
-from weighbridge import Signal
+from weighbridge import Signal, Vehicle
 from weighbridge.checks import check_drive, correct_drive
-from weighbridge.navigation.inertial import inertial_motion
+from weighbridge.navigation import find_motion
 from weighbridge.simulation import Sensors, make_scenario, simulate_car
 from weighbridge.vehicle import Mounting
 
@@ -30,18 +30,20 @@ def made_of(name, seed):
     """Drive, and its motion with a squat that is known, as vehicle files have it."""
     scenario = replace(make_scenario(name, seed=seed), sensors=Sensors(imu_rate=50.0))
     made = simulate_car(replace(scenario, duration=1200.0))
-    free = inertial_motion(made.drive)
-    return made.drive, inertial_motion(made.drive, known(free))
+    free = find_motion(made.drive)
+    return made.drive, find_motion(made.drive, known(free))
 
 
 def known(motion):
-    return Mounting(
-        roll=motion.mounting[0],
-        pitch=motion.mounting[1],
-        yaw=motion.mounting[2],
-        std=motion.mounting_std,
-        squat=motion.squat,
-        squat_std=5e-4,
+    return Vehicle(
+        mounting=Mounting(
+            roll=motion.mounting[0],
+            pitch=motion.mounting[1],
+            yaw=motion.mounting[2],
+            std=motion.mounting_std,
+            squat=motion.squat,
+            squat_std=5e-4,
+        )
     )
 
 
@@ -111,7 +113,7 @@ def halves_apart(motion, plain):
 @pytest.mark.parametrize(("axis", "degrees"), [("y", 3.0), ("y", -8.0), ("z", 30.0)])
 def test_a_sensor_moved_on_the_way_is_found_anew(any_vehicle, axis, degrees):
     drive, plain = any_vehicle
-    motion = inertial_motion(turned(drive, axis, degrees), known(plain))
+    motion = find_motion(turned(drive, axis, degrees), known(plain))
     (note,) = [n for n in motion.notes if n.id == "imu.moved"]
     size = float(note.values["size"].split()[0])
     assert size == pytest.approx(abs(degrees), abs=4.0)
@@ -122,7 +124,7 @@ def test_a_sensor_moved_on_the_way_is_found_anew(any_vehicle, axis, degrees):
 
 def test_a_mount_that_creeps_is_followed(any_vehicle):
     drive, plain = any_vehicle
-    motion = inertial_motion(turned(drive, "y", 5.0, slow=500.0), known(plain))
+    motion = find_motion(turned(drive, "y", 5.0, slow=500.0), known(plain))
     assert any(n.id == "imu.moved" for n in motion.notes)
     assert abs(halves_apart(motion, plain)) < 0.1
 
@@ -130,9 +132,9 @@ def test_a_mount_that_creeps_is_followed(any_vehicle):
 def test_a_moved_sensor_is_found_without_heights(car):
     drive, _ = car
     without = drive.without("altitude")
-    plain = inertial_motion(without)
+    plain = find_motion(without)
     assert not any(n.id == "imu.moved" for n in plain.notes)
-    motion = inertial_motion(turned(without, "y", 5.0), known(plain))
+    motion = find_motion(turned(without, "y", 5.0), known(plain))
     assert any(n.id == "imu.moved" for n in motion.notes)
     assert abs(halves_apart(motion, plain)) < 0.05
 
@@ -142,7 +144,7 @@ def test_no_steady_drive_is_called_moved(any_vehicle, start):
     drive, plain = any_vehicle
     assert not any(n.id == "imu.moved" for n in plain.notes)
     part = drive.between(start, start + 300.0)
-    assert not any(n.id == "imu.moved" for n in inertial_motion(part, known(plain)).notes)
+    assert not any(n.id == "imu.moved" for n in find_motion(part, known(plain)).notes)
 
 
 @pytest.mark.parametrize(
@@ -157,7 +159,7 @@ def test_no_steady_drive_is_called_moved(any_vehicle, start):
 )
 def test_a_wrong_scale_is_corrected(any_vehicle, gain):
     drive, plain = any_vehicle
-    motion = inertial_motion(scaled(drive, gain), known(plain))
+    motion = find_motion(scaled(drive, gain), known(plain))
     assert any(n.id == "imu.scale_corrected" for n in motion.notes)
     assert not any(n.id == "imu.scale_corrected" for n in plain.notes)
     assert motion.specific_force_scale_std > 0.0
@@ -175,7 +177,7 @@ def test_a_speed_that_is_smoothed_is_no_fault_of_the_sensor(any_vehicle, lag):
     values = speed.at(time)
     late, _ = lfilter([1.0 - kept], [1.0, -kept], values, zi=[kept * values[0]])
     smoothed = Signal(speed.name, speed.time, np.interp(speed.time, time, late))
-    motion = inertial_motion(drive.with_signals(smoothed), known(right))
+    motion = find_motion(drive.with_signals(smoothed), known(right))
     assert not any(note.id == "imu.scale_corrected" for note in motion.notes)
 
 
@@ -183,7 +185,7 @@ def test_a_small_scale_that_gravity_denies_is_left_to_the_squat(any_vehicle):
     drive, right = any_vehicle
     ahead = drive.signals["accel_x"]
     scaled = drive.with_signals(Signal(ahead.name, ahead.time, 1.05 * ahead.values))
-    motion = inertial_motion(scaled, known(right))
+    motion = find_motion(scaled, known(right))
     assert not any(note.id == "imu.scale_corrected" for note in motion.notes)
     # It is told and left open, for it may be the scale nevertheless.
     assert any(note.id == "imu.gain_unsure" for note in motion.notes)
@@ -195,7 +197,7 @@ def test_the_interval_holds_a_scale_that_is_left_to_the_squat(any_vehicle, gain)
     drive, right = any_vehicle
     ahead = drive.signals["accel_x"]
     scaled = drive.with_signals(Signal(ahead.name, ahead.time, gain * ahead.values))
-    motion = inertial_motion(scaled, known(right))
+    motion = find_motion(scaled, known(right))
     if not any(note.id == "imu.gain_unsure" for note in motion.notes):
         return
     slope, _ = force_slope(motion, right)
@@ -209,10 +211,10 @@ def test_without_gnss_other_tyres_may_be_what_looks_like_a_scale(any_vehicle):
     )
     speed = drive.signals["vehicle_speed"]
     faster = Signal(speed.name, speed.time, 1.05 * speed.values)
-    motion = inertial_motion(alone.with_signals(faster), known(right))
+    motion = find_motion(alone.with_signals(faster), known(right))
     assert any(note.values.get("tyres") for note in motion.notes)
     assert 0.025 < motion.specific_force_scale_std < 0.045
-    assert not any(note.values.get("tyres") for note in inertial_motion(alone, known(right)).notes)
+    assert not any(note.values.get("tyres") for note in find_motion(alone, known(right)).notes)
 
 
 def test_frozen_stretches_are_left_out(car):
@@ -227,7 +229,7 @@ def test_frozen_stretches_are_left_out(car):
         assert problem.id == "frozen.imu"
         assert f"{problem.values['longest']:.1f}" == "60.0"
         assert not problem.serious
-        motion = inertial_motion(frozen, known(plain))
+        motion = find_motion(frozen, known(plain))
         assert not motion.valid[(motion.time > 402.0) & (motion.time < 458.0)].any()
         slope, _ = force_slope(motion, plain)
         assert slope == pytest.approx(1.0, abs=0.01)
@@ -238,7 +240,7 @@ def test_an_axis_that_dies_leaves_what_was_before(car):
     s = drive.signals["gyro_z"]
     dead = drive.with_signals(Signal("gyro_z", s.time, np.where(s.time < 700.0, s.values, 0.0)))
     assert not any(p.serious for p in check_drive(dead))
-    motion = inertial_motion(dead)
+    motion = find_motion(dead)
     assert motion.valid[motion.time < 650.0].any()
     assert not motion.valid[motion.time > 702.0].any()
 
@@ -246,7 +248,7 @@ def test_an_axis_that_dies_leaves_what_was_before(car):
 def test_rounding_is_not_called_frozen(car):
     drive, _ = car
     rounded = replaced(drive, GYRO, np.round(columns(drive, GYRO) / 0.005) * 0.005)
-    before, after = (np.mean(inertial_motion(d).valid) for d in (drive, rounded))
+    before, after = (np.mean(find_motion(d).valid) for d in (drive, rounded))
     assert after > 0.95 * before > 0.9
 
 
@@ -255,7 +257,7 @@ def test_dropouts_and_spikes_are_left_out(any_vehicle, value):
     drive, plain = any_vehicle
     force = columns(drive, ACCEL)
     force[np.random.default_rng(5).random(force.shape[0]) < 0.03] = value
-    motion = inertial_motion(replaced(drive, ACCEL, force), known(plain))
+    motion = find_motion(replaced(drive, ACCEL, force), known(plain))
     assert any(n.id == "imu.false_samples" for n in motion.notes)
     slope, _ = force_slope(motion, plain)
     assert slope == pytest.approx(1.0, abs=0.005)
@@ -265,7 +267,7 @@ def test_one_axis_that_drops_out_to_zero_is_left_out(car):
     drive, plain = car
     force = columns(drive, ACCEL)
     force[np.random.default_rng(6).random(force.shape[0]) < 0.05, 0] = 0.0
-    slope, _ = force_slope(inertial_motion(replaced(drive, ACCEL, force), known(plain)), plain)
+    slope, _ = force_slope(find_motion(replaced(drive, ACCEL, force), known(plain)), plain)
     assert slope == pytest.approx(1.0, abs=0.005)
 
 
@@ -291,7 +293,7 @@ def at_ten_hertz(drive):
 
 def test_ten_samples_a_second_leave_no_holes(any_vehicle):
     drive, plain = any_vehicle
-    motion = inertial_motion(at_ten_hertz(drive), known(plain))
+    motion = find_motion(at_ten_hertz(drive), known(plain))
     assert motion.speed_delay == pytest.approx(plain.speed_delay, abs=0.03)
     assert np.mean(motion.valid) > 0.98 * np.mean(plain.valid)
 
@@ -302,7 +304,7 @@ def test_a_sensor_slower_than_its_table_is_told(car):
         values = columns(drive, names)
         drive = replaced(drive, names, values[np.arange(values.shape[0]) // 15 * 15])
     with refused("imu.slow"):
-        inertial_motion(correct_drive(drive))
+        find_motion(correct_drive(drive))
 
 
 @pytest.mark.parametrize("degrees", [3.0, -3.0])
@@ -321,7 +323,7 @@ def test_a_holder_that_nods_is_no_unit_of_the_speed(any_vehicle, degrees):
     rate[:, 1] -= np.gradient(angle, time)
     nodding = replaced(replaced(drive, ACCEL, force), GYRO, rate)
     with refused("imu.mount_loose"):
-        inertial_motion(nodding)
+        find_motion(nodding)
 
 
 @pytest.mark.parametrize("scale", [0.621, 1.609])
@@ -330,4 +332,4 @@ def test_a_speed_in_another_unit_is_no_holder_that_nods(any_vehicle, scale):
     speed = drive.signals["vehicle_speed"]
     other = drive.with_signals(Signal(speed.name, speed.time, scale * speed.values))
     with refused("speed.unit_of_accel"):
-        inertial_motion(other.without("gnss_speed", "latitude", "longitude", "altitude"))
+        find_motion(other.without("gnss_speed", "latitude", "longitude", "altitude"))

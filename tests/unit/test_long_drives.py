@@ -8,9 +8,8 @@ import polars as pl
 from numpy.testing import assert_array_equal
 
 from weighbridge import read_drive
-from weighbridge.navigation import aiding
+from weighbridge.navigation import aiding, find_motion
 from weighbridge.navigation.aiding import resample
-from weighbridge.navigation.inertial import inertial_motion
 from weighbridge.simulation import make_scenario, simulate_car
 
 
@@ -31,7 +30,7 @@ def bytes_per_sample(duration):
     drive = simulate_car(replace(scenario, duration=duration)).drive
     tracemalloc.start()
     try:
-        inertial_motion(drive)
+        find_motion(drive)
         return tracemalloc.get_traced_memory()[1] / len(drive.signals["accel_x"])
     finally:
         tracemalloc.stop()

@@ -10,7 +10,6 @@ from weighbridge.balance import force_balance
 from weighbridge.balance.law import drag_force
 from weighbridge.calibration.regression import build_rows
 from weighbridge.navigation import find_motion
-from weighbridge.navigation.inertial import inertial_motion
 from weighbridge.simulation import make_scenario, simulate_car
 from weighbridge.vehicle import Driveline, Mounting, TorqueModel
 
@@ -23,7 +22,7 @@ def made():
 @pytest.mark.parametrize("degrees", [90.0, 180.0])
 def test_a_moved_sensor_is_found_anew(made, degrees):
     drive = made.drive
-    plain = inertial_motion(drive)
+    plain = find_motion(drive)
     known = Mounting(
         roll=plain.mounting[0],
         pitch=plain.mounting[1],
@@ -36,7 +35,7 @@ def test_a_moved_sensor_is_found_anew(made, degrees):
         x, y = drive.signals[f"{kind}_x"], drive.signals[f"{kind}_y"]
         turned.append(Signal(f"{kind}_x", x.time, c * x.values - s * y.values))
         turned.append(Signal(f"{kind}_y", x.time, s * x.values + c * y.values))
-    motion = inertial_motion(drive.with_signals(*turned), known)
+    motion = find_motion(drive.with_signals(*turned), Vehicle(mounting=known))
     assert any(note.id == "imu.mounting_moved" for note in motion.notes)
     error = np.interp(motion.time, plain.time, plain.specific_force) - motion.specific_force
     assert np.sqrt(np.mean(error[plain.speed[: error.size] > 2.0] ** 2)) < 0.05
@@ -54,7 +53,7 @@ def test_an_axis_with_a_gap_is_not_invented(made):
         )
     )
     for changed in (holed, other):
-        motion = inertial_motion(changed)
+        motion = find_motion(changed)
         inside = (motion.time > 102.0) & (motion.time < 158.0)
         assert not motion.valid[inside].any()
 

@@ -22,7 +22,6 @@ from weighbridge.estimators.squat import (
     squat_by_speed,
 )
 from weighbridge.navigation import find_motion, with_squat
-from weighbridge.navigation.inertial import inertial_motion
 from weighbridge.simulation import (
     MIDSIZE,
     Scenario,
@@ -267,7 +266,7 @@ def test_a_holder_that_swings_is_told_and_the_mass_is_right(weighed):
 def test_gravity_on_hills_is_read_as_right_as_acceleration():
     route = mixed_route(75, out=[("hills", 4000)], back=[("hills", 4000)])
     made = simulate_car(Scenario(name="hills", car=MIDSIZE, route=route, seed=75))
-    motion = inertial_motion(made.drive)
+    motion = find_motion(made.drive)
     assert motion.squat == pytest.approx(MIDSIZE.squat, abs=1e-3)
     truth = made.truth
     accel = np.interp(motion.time, truth.time, truth.accel)

@@ -2,7 +2,7 @@
 
 from weighbridge.navigation.motion import BY_SPEED, Motion, MotionSource, with_squat
 from weighbridge.navigation.printed import PrintedFilterSettings, mounting_of, printed_motion
-from weighbridge.navigation.select import find_motion, without_accelerometer
+from weighbridge.navigation.select import find_motion, identify_motion, without_accelerometer
 
 __all__ = [
     "BY_SPEED",
@@ -10,6 +10,7 @@ __all__ = [
     "MotionSource",
     "PrintedFilterSettings",
     "find_motion",
+    "identify_motion",
     "mounting_of",
     "printed_motion",
     "with_squat",

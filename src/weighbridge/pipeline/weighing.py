@@ -38,8 +38,7 @@ from weighbridge.estimators.judging import lacks_accelerometer
 from weighbridge.estimators.settings import differences
 from weighbridge.estimators.squat import of_vehicle
 from weighbridge.messages import Problem, phrase, refused
-from weighbridge.navigation import BY_SPEED, Motion, without_accelerometer
-from weighbridge.navigation.select import identify_motion
+from weighbridge.navigation import BY_SPEED, Motion, identify_motion, without_accelerometer
 from weighbridge.pipeline.given import (
     GivenDrive,
     GivenVehicle,
