@@ -15,7 +15,6 @@ from weighbridge.balance.averaging import WINDOW, window_params
 from weighbridge.estimators.judging import STOP
 from weighbridge.kernels import window_means
 from weighbridge.navigation import forward as navigation
-from weighbridge.navigation.select import scaled_for_navigation
 from weighbridge.pipeline.forward import forward_weigh, identify_forward, lateness
 from weighbridge.signals.recent import STEP, instants, recent
 from weighbridge.simulation import (
@@ -244,8 +243,7 @@ def rows_by_steps(drive, setup):
     parts, moved = [], []
     for until in instants(drive, setup.step):
         records = recent(drive, until, setup.step)
-        seen = scaled_for_navigation(records, setup.vehicle, positions=True)
-        motion, found = navigation.step(motion, seen, until, setup.navigation)
+        motion, found = navigation.step(motion, records, until, setup.navigation)
         if found is not None:
             moved.append(found)
         if motion.motion is None or motion.motion.time.size < 2:

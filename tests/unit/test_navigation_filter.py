@@ -11,7 +11,6 @@ from tests.unit.test_navigation import simulate
 from weighbridge.constants import GRAVITY
 from weighbridge.navigation import find_motion, identify_motion
 from weighbridge.navigation.forward import forward_motion, lateness
-from weighbridge.navigation.rows import AHEAD
 from weighbridge.signals.recent import STEP
 
 
@@ -70,7 +69,7 @@ def test_a_gap_is_known_only_after_it(hills):
     inside = (m.time > 100.1) & (m.time < 103.9)
     assert not m.valid[inside].any()
     assert np.isfinite(m.specific_force).all()
-    before = m.time < 100.0 - AHEAD
+    before = m.time < 100.0 - lateness(setup)
     whole = forward_motion(drive, setup)
     assert_array_equal(m.grade[before], whole.grade[before])
     assert_array_equal(m.time, whole.time)
