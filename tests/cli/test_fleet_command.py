@@ -102,11 +102,9 @@ def test_a_drive_that_cannot_be_read_is_exit_status_2(weighbridge, fleet, addres
 def test_a_scheduler_without_a_worker_is_told(weighbridge, fleet, tmp_path, monkeypatch):
     from distributed import LocalCluster
 
-    from weighbridge.cli import fleet as command
-
     drives, cars = fleet
     results = tmp_path / "results"
-    monkeypatch.setattr(command, "_PATIENCE", 0.3)
+    monkeypatch.setattr("weighbridge.cli.fleet._PATIENCE", 0.3)
     with LocalCluster(
         n_workers=0, processes=False, protocol="tcp", dashboard_address="127.0.0.1:0"
     ) as cluster:

@@ -5,6 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
+from weighbridge.constants import GRAVITY
 from weighbridge.kernels.ins import propagate, propagate_covariance
 from weighbridge.kernels.ins_model import (
     BA,
@@ -28,6 +29,7 @@ from weighbridge.kernels.ins_model import (
     Z_SPEED_VAR,
     Z_STILL,
     Z_VVAR,
+    Noise,
     Q,
     V,
     new_rows,
@@ -35,13 +37,13 @@ from weighbridge.kernels.ins_model import (
 from weighbridge.kernels.ins_rows import correct, update
 from weighbridge.kernels.ins_smoother import smooth
 from weighbridge.kernels.rotation import euler_to_quaternion
-from weighbridge.navigation.settings import NavigationSettings
 
-QUIET = (
-    NavigationSettings()
-    .noise()
-    ._replace(accel_psd=0.0, gyro_psd=0.0, gyro_share=0.0, accel_bias_psd=0.0, gyro_bias_psd=0.0)
-)
+QUIET = Noise(
+    gravity=GRAVITY, accel_psd=0.0, gyro_psd=0.0, gyro_share=0.0, accel_bias_psd=0.0,
+    gyro_bias_psd=0.0, lateral_std=0.1, lateral_slip_std=0.01, lateral_turn_std=0.5,
+    vertical_std=0.08, vertical_slope_std=0.004, constraint_time=0.3, still_std=0.02,
+    rest_rate_std=0.002, gate=20.0, patience=10.0, force_time=0.15, constraints=1.0,
+)  # fmt: skip
 
 
 def _state():

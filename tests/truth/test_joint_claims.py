@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import cache
+from importlib import import_module
 
 import numpy as np
 import pytest
@@ -10,7 +11,6 @@ import weighbridge as wb
 from weighbridge import Signal, Status, Vehicle
 from weighbridge.balance import force_balance
 from weighbridge.estimators import ESTIMATORS
-from weighbridge.estimators.joint import batch
 from weighbridge.navigation import find_motion
 from weighbridge.simulation import (
     ELECTRIC,
@@ -166,6 +166,7 @@ def test_noise_of_a_measured_torque_does_not_move_the_mean():
 
 @pytest.mark.parametrize("factor", [1.0 / 3.0, 3.0])
 def test_a_start_three_times_off_costs_no_accuracy(car, usual, factor, monkeypatch):
+    batch = import_module(ESTIMATORS["joint"].estimate.__module__)
     guess = batch.first_guess
     before = [usual(k) for k in range(2)]
     monkeypatch.setattr(batch, "first_guess", lambda phi, y: factor * guess(phi, y))

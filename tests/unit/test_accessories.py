@@ -9,7 +9,7 @@ import pytest
 import weighbridge as wb
 from weighbridge.balance.law import accessory_column
 from weighbridge.calibration import joint as joint_fit
-from weighbridge.estimators.joint import batch
+from weighbridge.estimators import ESTIMATORS
 from weighbridge.navigation import BY_SPEED
 from weighbridge.pipeline.forward import forward_weigh, identify_forward
 from weighbridge.simulation import (
@@ -107,7 +107,7 @@ def test_a_motor_has_no_such_load():
 def test_the_interval_is_narrower_than_that_of_a_scale_that_takes_it_for_noise(
     weighing, monkeypatch
 ):
-    monkeypatch.setattr(batch, "find_switched", lambda *_: None)
+    monkeypatch.setattr(f"{ESTIMATORS['joint'].estimate.__module__}.find_switched", lambda *_: None)
     blind = wb.weigh(weighing.drive, weighing.vehicle)
     assert weighing.result.bound_std < 0.75 * blind.result.bound_std
     assert weighing.result.sizes.slow < 0.75 * blind.result.sizes.slow

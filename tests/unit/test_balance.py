@@ -9,7 +9,6 @@ from tests.noted import refused
 
 from weighbridge import Drive, DriveInfo, Signal, Vehicle
 from weighbridge.balance import Reason, force_balance
-from weighbridge.balance.gear_fit import share_on_gears
 from weighbridge.balance.law import drag_force, rotating_mass
 from weighbridge.estimators.rls import estimate
 from weighbridge.navigation import Motion
@@ -279,12 +278,3 @@ def test_an_outlier_is_a_bad_fit():
     # So sharp a fall behind it may be a foot that leaves the accelerator as well.
     assert track.row_reason[rising] in (Reason.BAD_FIT, Reason.OVERRUN)
     assert track.mass == pytest.approx(MASS, rel=0.01)
-
-
-def test_share_on_gears():
-    balance = force_balance(drive(), CAR, motion())
-    assert share_on_gears(balance, CAR) == 1.0
-    other = replace(CAR, driveline=Driveline(gearings=(17.0, 8.5)))
-    assert share_on_gears(force_balance(drive(), other, motion()), other) == 0.0
-    unknown = replace(CAR, driveline=Driveline())
-    assert share_on_gears(balance, unknown) is None

@@ -1,6 +1,7 @@
 """The reproduction of Galvão: figures beside the paper's, and what they are worth."""
 
 from dataclasses import replace
+from importlib import import_module
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from tests.noted import error
 from weighbridge import ConfigError
 from weighbridge.constants import GRAVITY
 from weighbridge.estimators.settings import changed, parsed
-from weighbridge.papers import PAPERS, galvao, galvao_drives, galvao_torque
+from weighbridge.papers import PAPERS, galvao, galvao_torque
 from weighbridge.papers.galvao_bounds import (
     FAST,
     SLOW,
@@ -19,7 +20,6 @@ from weighbridge.papers.galvao_bounds import (
     speed_says,
     speed_table,
 )
-from weighbridge.papers.galvao_drives import CAR
 from weighbridge.papers.galvao_figures import PAPER_WORST, item_figures
 from weighbridge.papers.galvao_torque import (
     WAYS,
@@ -29,8 +29,10 @@ from weighbridge.papers.galvao_torque import (
     torque_table,
     torque_trial,
 )
+from weighbridge.simulation import COMPACT
 
-PAPERS_DURATION = galvao_drives.DURATION
+DRIVES = import_module(galvao.easy_route.__module__)
+PAPERS_DURATION = DRIVES.DURATION
 BRIEF = 600.0
 """Of a drive of these tests [s]."""
 
@@ -39,7 +41,7 @@ BRIEF = 600.0
 def brief():
     """Half the paper's time is enough to see what its drives show."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(galvao_drives, "DURATION", BRIEF)
+        patch.setattr(DRIVES, "DURATION", BRIEF)
         yield
 
 
@@ -189,7 +191,7 @@ def test_page_begins_with_the_papers_figures(done, tmp_path, monkeypatch):
 def trial(brief):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(galvao_torque, "LOADS", (0.0, 200.0, 400.0))
-        patch.setattr(galvao_drives, "DURATION", 400.0)
+        patch.setattr(DRIVES, "DURATION", 400.0)
         return torque_trial(1234, galvao.easy_route(1234))
 
 
@@ -241,11 +243,11 @@ def test_a_coast_down_is_that_of_the_longitudinal_law(head_wind):
     assert speed[0] == pytest.approx(FAST)
     assert speed[-1] <= SLOW < speed[-2]
     # Stepped, with drag, rolling resistance, air and wheels of the paper's car by hand.
-    turning = 1092.0 + CAR.wheel_inertia / 0.29**2
+    turning = 1092.0 + COMPACT.wheel_inertia / 0.29**2
     drag = 0.5 * 101_325.0 / (287.05 * 288.15) * 0.35 * 2.15
 
     def slowed(_, v):
-        force = drag * (v + head_wind) ** 2 + 1092.0 * GRAVITY * CAR.rolling_coefficient
+        force = drag * (v + head_wind) ** 2 + 1092.0 * GRAVITY * COMPACT.rolling_coefficient
         return -force / turning
 
     time = STEP * np.arange(speed.size)

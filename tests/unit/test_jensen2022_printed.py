@@ -16,7 +16,6 @@ from weighbridge.kernels import ins_printed as kernel
 from weighbridge.kernels import rls
 from weighbridge.kernels.rotation import euler_to_quaternion
 from weighbridge.navigation import PrintedFilterSettings
-from weighbridge.navigation.printed import level_mounting
 from weighbridge.papers.jensen2022_printed import (
     PrintedSettings,
     train,
@@ -176,7 +175,7 @@ def test_the_fit_is_on_the_grid_unless_it_is_told_not_to(made, car):
 def test_a_drive_that_begins_on_the_move_is_refused(made):
     late = made.drive.between(120.0, 200.0)
     with error(DriveError, "car-short 200"):
-        level_mounting(late)
+        train(late, 1578.0)
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,6 @@ from weighbridge import Signal
 from weighbridge.balance import Reason
 from weighbridge.balance.averaging import windows
 from weighbridge.estimators import ESTIMATORS
-from weighbridge.estimators.joint import batch
 from weighbridge.estimators.joint import forward as joint_forward
 from weighbridge.estimators.joint.slow_errors import DATA_SHEET_NAMES, design, usable_rows
 from weighbridge.estimators.noisy_motion import too_low
@@ -21,6 +20,7 @@ from weighbridge.simulation import MIDSIZE, Scenario, short_route, simulate_car
 from weighbridge.vehicle import Driveline, TorqueModel
 
 joint = ESTIMATORS["joint"]
+BATCH = joint.estimate.__module__
 
 LOADED = 400.0
 
@@ -151,9 +151,9 @@ def test_fuel_counts_in_a_calibration(made, car):
 
 def test_what_noise_of_the_motion_takes_reaches_mass_and_interval(balance, car, monkeypatch):
     real = joint.estimate(balance, car)
-    monkeypatch.setattr(batch, "attenuation", lambda weight, *_: np.full(weight.size, 0.0))
+    monkeypatch.setattr(f"{BATCH}.attenuation", lambda weight, *_: np.full(weight.size, 0.0))
     bare = joint.estimate(balance, car)
-    monkeypatch.setattr(batch, "attenuation", lambda weight, *_: np.full(weight.size, 0.1))
+    monkeypatch.setattr(f"{BATCH}.attenuation", lambda weight, *_: np.full(weight.size, 0.1))
     much = joint.estimate(balance, car)
     assert bare.mass < real.mass < 1.02 * bare.mass
     assert much.mass + balance.table.fuel_burnt[-1] == pytest.approx(
@@ -164,7 +164,7 @@ def test_what_noise_of_the_motion_takes_reaches_mass_and_interval(balance, car, 
 
 def test_what_the_fit_left_open_reaches_the_interval(balance, car, monkeypatch):
     real = joint.estimate(balance, car)
-    monkeypatch.setattr(batch, "fit_consider_std", lambda *_: 0.05)
+    monkeypatch.setattr(f"{BATCH}.fit_consider_std", lambda *_: 0.05)
     wide = joint.estimate(balance, car)
     assert wide.mass == real.mass
     assert wide.std > car.provenance.std_factor * 0.05 * wide.mass
