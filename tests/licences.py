@@ -6,12 +6,16 @@
 from __future__ import annotations
 
 import re
+import tomllib
 from importlib import metadata
 from pathlib import Path
 
-from weighbridge.cli.installation import EXTRAS, requirements
+from packaging.requirements import Requirement
 
-PAGE = Path(__file__).parents[1] / "docs" / "licences.md"
+ROOT = Path(__file__).parents[1]
+PAGE = ROOT / "docs" / "licences.md"
+OF_OTHERS = {"formats", "dev", "docs", "studies"}
+"""Extras that are made of others, or not for users."""
 
 READ = {
     "numba": "BSD-2-Clause",
@@ -58,12 +62,13 @@ code of theirs is in it.
 
 def needed() -> dict[str, list[str]]:
     """Extras that need each package; an empty name is the program itself."""
-    wanted = requirements()
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    wanted = {"": project["dependencies"], **project["optional-dependencies"]}
     found: dict[str, list[str]] = {}
-    for extra in ("", *EXTRAS):
-        if extra != "formats":
-            for line in wanted[extra]:
-                found.setdefault(line.name, []).append(extra)
+    for extra, lines in wanted.items():
+        if extra not in OF_OTHERS:
+            for line in lines:
+                found.setdefault(Requirement(line).name.lower(), []).append(extra)
     return dict(sorted(found.items(), key=lambda item: ("" not in item[1], item[0].lower())))
 
 
