@@ -6,8 +6,11 @@ from dataclasses import replace
 
 from tests.noted import noted
 
+import weighbridge as wb
 from weighbridge import LiveStatus, LiveWeighing
-from weighbridge.live.weighing import SignalHealth
+
+EMPTY = wb.LiveScale(wb.Vehicle()).weighing()
+"""Before the first sample."""
 
 NAMES = (
     *(f"accel_{a}" for a in "xyz"), *(f"gyro_{a}" for a in "xyz"), "vehicle_speed",
@@ -15,9 +18,10 @@ NAMES = (
 )  # fmt: skip
 
 
-def health(*, silent: tuple[str, ...] = ()) -> tuple[SignalHealth, ...]:
+def health(*, silent: tuple[str, ...] = ()) -> tuple[object, ...]:
     return tuple(
-        SignalHealth(
+        replace(
+            EMPTY.signals[0],
             name=name,
             rate=0.0 if name in silent else 200.0 if "l_" in name or "o_" in name else 5.0,
             age=math.inf if name in silent else 0.1,
@@ -27,7 +31,7 @@ def health(*, silent: tuple[str, ...] = ()) -> tuple[SignalHealth, ...]:
     )
 
 
-def rests() -> tuple[SignalHealth, ...]:
+def rests() -> tuple[object, ...]:
     """Signals of a vehicle that is parked."""
     return tuple(replace(s, rests=True, age=999.0) for s in health())
 
@@ -55,7 +59,7 @@ def weighing(time: float = 300.0, **changed: object) -> LiveWeighing:
         "signals": health(),
         "problems": (),
     }
-    return LiveWeighing(**{**values, **changed})  # type: ignore[arg-type]
+    return replace(EMPTY, **{**values, **changed})
 
 
 def drive(seconds: int = 600, begin: float = 0.0) -> Iterator[LiveWeighing]:

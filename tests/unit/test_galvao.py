@@ -11,7 +11,7 @@ from tests.noted import error
 from weighbridge import ConfigError
 from weighbridge.constants import GRAVITY
 from weighbridge.estimators.settings import changed, parsed
-from weighbridge.papers import PAPERS, galvao, galvao_torque
+from weighbridge.papers import PAPERS, galvao
 from weighbridge.papers.galvao_bounds import (
     FAST,
     SLOW,
@@ -21,14 +21,6 @@ from weighbridge.papers.galvao_bounds import (
     speed_table,
 )
 from weighbridge.papers.galvao_figures import PAPER_WORST, item_figures
-from weighbridge.papers.galvao_torque import (
-    WAYS,
-    TorqueTrial,
-    Weighed,
-    torque_figures,
-    torque_table,
-    torque_trial,
-)
 from weighbridge.simulation import COMPACT
 
 DRIVES = import_module(galvao.easy_route.__module__)
@@ -51,12 +43,13 @@ def three(brief):
 
 
 @pytest.fixture(scope="module")
-def done(three):
+def done(three, trial):
     fitted, drives, tests = three
     masses = np.linspace(1092.0, 1492.0, 9)
+    weighed = type(next(iter(trial.ways.values())))
     std30, std40 = np.full(5, 30.0), np.full(5, 40.0)
     wild = 1000.0 + 700.0 * np.sin(np.arange(9.0))
-    trial = galvao.Trial(
+    masses_apart = galvao.Trial(
         kind="other masses", masses=masses, answers=np.full(9, 1092.0), pinned=wild
     )
     return galvao.Reproduction(
@@ -65,16 +58,17 @@ def done(three):
         tests=tests,
         starts=((800.0, 800.4, 810.0), (2000.0, 1999.0, 1900.0)),
         stated=((900.0, 900.1, 0.5),),
-        trials=(trial, trial),
-        torque=TorqueTrial(
+        trials=(masses_apart, masses_apart),
+        torque=replace(
+            trial,
             masses=np.array([1092.0, 1092.0, 1092.0, 1292.0, 1492.0]),
             ways=dict(
                 zip(
-                    WAYS,
+                    trial.ways,
                     (
-                        Weighed(np.array([1092.0, 1081.08, 1102.92, 1292.0, np.nan]), std30),
-                        Weighed(np.array([1092.0, 982.8, 982.8, 1292.0, 1492.0]), std40),
-                        Weighed(np.array([1092.0, 1092.0, 1092.0, 1192.0, 1292.0]), std40),
+                        weighed(np.array([1092.0, 1081.08, 1102.92, 1292.0, np.nan]), std30),
+                        weighed(np.array([1092.0, 982.8, 982.8, 1292.0, 1492.0]), std40),
+                        weighed(np.array([1092.0, 1092.0, 1092.0, 1192.0, 1292.0]), std40),
                     ),
                     strict=True,
                 )
@@ -169,7 +163,7 @@ def test_started_at_the_mass_the_printed_filter_gives_it_back(three):
 
 def test_tables_have_a_text_for_every_column(done):
     tables = [made(done) for made in (galvao.tests_table, galvao.starts_table, galvao.trials_table)]
-    for table in (*tables, torque_table(done.torque)):
+    for table in (*tables, galvao.torque_table(done.torque)):
         assert all(len(row) == len(table.columns) for row in table.rows)
 
 
@@ -190,13 +184,13 @@ def test_page_begins_with_the_papers_figures(done, tmp_path, monkeypatch):
 @pytest.fixture(scope="module")
 def trial(brief):
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(galvao_torque, "LOADS", (0.0, 200.0, 400.0))
+        patch.setattr(f"{galvao.torque_trial.__module__}.LOADS", (0.0, 200.0, 400.0))
         patch.setattr(DRIVES, "DURATION", 400.0)
-        return torque_trial(1234, galvao.easy_route(1234))
+        return galvao.torque_trial(1234, galvao.easy_route(1234))
 
 
 def test_recorded_torque_weighs_the_load_where_speed_alone_does_not(trial):
-    by_map, *_ = WAYS
+    by_map, *_ = trial.ways
     assert np.max(np.abs(trial.errors(by_map))) < 0.05
     gain = np.polyfit(trial.masses, trial.ways[by_map].mass, 1)[0]
     assert gain == pytest.approx(1.0, abs=0.15)
@@ -204,7 +198,7 @@ def test_recorded_torque_weighs_the_load_where_speed_alone_does_not(trial):
 
 
 def test_errors_of_recorded_torque_are_told(done):
-    said = {name: found.text for name, found in torque_figures(done.torque).items()}
+    said = {name: found.text for name, found in item_figures(done).items()}
     # 30 kg of standard deviation are 59 kg of 95 %: 5.4 % of 1092, 4.6 of 1292, 3.9 of 1492.
     assert said["torque errors"].startswith("errors +0.0 / -1.0 / +1.0 % ± 5.4 / 5.4 / 5.4 %; ")
     assert "200 and 400 kg loaded +0.0 / no mass % ± 4.6 / 3.9 %" in said["torque errors"]
@@ -213,8 +207,8 @@ def test_errors_of_recorded_torque_are_told(done):
     assert said["blind torque errors"].endswith("3 of 5 within 95 %")
     assert said["torque errors"].endswith("4 of 4 within 95 %")
     # A drive without a mass agrees with nothing.
-    assert not torque_figures(done.torque)["torque errors"].agrees
-    *_, last, slopes = torque_table(done.torque).rows
+    assert not item_figures(done)["torque errors"].agrees
+    *_, last, slopes = galvao.torque_table(done.torque).rows
     assert last[2] == "no mass"
     # 100 kg found for 200 loaded, and 200 for 400.
     assert slopes[-2] == "+0.50 ± 0.00"

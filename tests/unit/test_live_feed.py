@@ -10,7 +10,6 @@ from weighbridge import ConfigError, MissingExtraError
 from weighbridge.errors import SourceError
 from weighbridge.live import SOURCES, Feed, parse_source
 from weighbridge.live.clock import now
-from weighbridge.live.device_clock import DeviceClock
 
 
 def block(k):
@@ -170,47 +169,6 @@ def test_close_ends_all_at_once():
     feed.close()
     assert time.monotonic() - begun < 1.5
     assert all(s.ended for s in feed.states())
-
-
-def test_clock_of_a_device_keeps_its_spacing():
-    rng = np.random.default_rng(2)
-    clock = DeviceClock()
-    stamps = 5000.0 + 0.1 * np.arange(600)
-    late = rng.exponential(0.03, 600)
-    late[::50] = 0.0
-    host = [clock.host(s, 1.7e9 + s - 5000.0 + d) for s, d in zip(stamps, late, strict=True)]
-    error = np.array(host) - 1.7e9 - (stamps - 5000.0)
-    assert abs(error[1:]).max() < 1e-6 + late.max()
-    assert np.ptp(error[100:]) < 1e-6
-
-
-@pytest.mark.parametrize("jump", [-3600.0, 3600.0, -1.7e9])
-def test_clock_of_a_device_that_is_set(jump):
-    clock = DeviceClock()
-    error = []
-    for k in range(1000):
-        true = 1e6 + 0.02 * k
-        error.append(clock.host(true + (jump if k >= 500 else 0.0), true + 0.01) - true)
-    assert max(map(abs, error[:500])) < 0.02
-    # Set back, it is believed after two seconds; set forward at once.
-    assert max(map(abs, error[610:])) < 0.02
-
-
-def test_one_false_stamp_does_no_lasting_harm():
-    clock = DeviceClock()
-    error = []
-    for k in range(1000):
-        true = 1e6 + 0.02 * k
-        error.append(clock.host(9e9 if k == 300 else true, true + 0.01) - true)
-    assert max(map(abs, error[410:])) < 0.02
-
-
-def test_clock_that_drifts_is_followed():
-    clock = DeviceClock()
-    for k in range(20_000):
-        true = 0.1 * k
-        error = clock.host(true * (1.0 - 50e-6), true + 0.01) - true
-    assert abs(error - 0.01) < 2e-3
 
 
 def test_kinds_of_sources_are_told():

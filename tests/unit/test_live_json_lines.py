@@ -4,6 +4,7 @@ import socket
 import time
 from threading import Event, Thread
 
+import numpy as np
 import pytest
 from tests.noted import error
 
@@ -48,6 +49,60 @@ def test_stamps_keep_their_spacing():
         line = json.dumps({"t": 7.0 + 0.1 * k, "gear": 1}).encode() + b"\n"
         times += [t for t, _ in reader.read(line, 50.0 + 0.1 * k + late)]
     assert [t - times[0] for t in times] == pytest.approx([0.0, 0.1, 0.2, 0.3])
+
+
+class Sender:
+    """A sender with a clock of its own."""
+
+    def __init__(self):
+        self.reader = LineReader("lines:-")
+
+    def host(self, stamp, arrived):
+        """Instant by the host's clock of a line that it stamps so, and that arrives then [s]."""
+        line = json.dumps({"t": stamp, "gear": 1}).encode() + b"\n"
+        ((time, _),) = self.reader.read(line, arrived)
+        return time
+
+
+def test_clock_of_a_device_keeps_its_spacing():
+    rng = np.random.default_rng(2)
+    clock = Sender()
+    stamps = 5000.0 + 0.1 * np.arange(600)
+    late = rng.exponential(0.03, 600)
+    late[::50] = 0.0
+    host = [clock.host(s, 1.7e9 + s - 5000.0 + d) for s, d in zip(stamps, late, strict=True)]
+    error = np.array(host) - 1.7e9 - (stamps - 5000.0)
+    assert abs(error[1:]).max() < 1e-6 + late.max()
+    assert np.ptp(error[100:]) < 1e-6
+
+
+@pytest.mark.parametrize("jump", [-3600.0, 3600.0, -1.7e9])
+def test_clock_of_a_device_that_is_set(jump):
+    clock = Sender()
+    error = []
+    for k in range(1000):
+        true = 1e6 + 0.02 * k
+        error.append(clock.host(true + (jump if k >= 500 else 0.0), true + 0.01) - true)
+    assert max(map(abs, error[:500])) < 0.02
+    # Set back, it is believed after two seconds; set forward at once.
+    assert max(map(abs, error[610:])) < 0.02
+
+
+def test_one_false_stamp_does_no_lasting_harm():
+    clock = Sender()
+    error = []
+    for k in range(1000):
+        true = 1e6 + 0.02 * k
+        error.append(clock.host(9e9 if k == 300 else true, true + 0.01) - true)
+    assert max(map(abs, error[410:])) < 0.02
+
+
+def test_clock_that_drifts_is_followed():
+    clock = Sender()
+    for k in range(20_000):
+        true = 0.1 * k
+        error = clock.host(true * (1.0 - 50e-6), true + 0.01) - true
+    assert abs(error - 0.01) < 2e-3
 
 
 @pytest.mark.parametrize(

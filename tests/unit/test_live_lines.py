@@ -2,6 +2,7 @@
 
 import json
 import math
+import pickle
 import resource
 import subprocess
 import sys
@@ -69,30 +70,30 @@ def test_a_folder_is_refused_in_a_sentence(tmp_path):
 
 
 FULL = """
-import resource, signal, sys
-sys.path.insert(0, sys.argv[2])
-from tests.unit.made_weighings import weighing
+import pickle, resource, signal, sys
+from dataclasses import replace
 from weighbridge.errors import ConfigError
 from weighbridge.live import Lines
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 lines = Lines(sys.argv[1])
-lines.show(weighing())
+weighing = pickle.load(sys.stdin.buffer)
+lines.show(weighing)
 resource.setrlimit(resource.RLIMIT_FSIZE, (4000, resource.RLIM_INFINITY))
 for k in range(3):
     try:
-        lines.show(weighing())
+        lines.show(weighing)
     except ConfigError as error:
         print(error)
 resource.setrlimit(resource.RLIMIT_FSIZE, (resource.RLIM_INFINITY,) * 2)
-lines.show(weighing(mass=1.0))
+lines.show(replace(weighing, mass=1.0))
 """
 
 
-def test_a_full_disk_is_told_and_leaves_whole_lines(tmp_path, pytestconfig):
+def test_a_full_disk_is_told_and_leaves_whole_lines(tmp_path):
     path = tmp_path / "masses.jsonl"
-    words = [sys.executable, "-c", FULL, str(path), str(pytestconfig.rootpath)]
-    ran = subprocess.run(words, capture_output=True, text=True, check=True)
-    assert str(path) in ran.stdout
+    words = [sys.executable, "-c", FULL, str(path)]
+    ran = subprocess.run(words, input=pickle.dumps(weighing()), capture_output=True, check=True)
+    assert str(path) in ran.stdout.decode()
     lines = path.read_text().splitlines()
     assert len(lines[0]) > 1400
     rows = [json.loads(line) for line in lines]

@@ -17,7 +17,6 @@ from tests.unit.made_weighings import drive, weighing
 from weighbridge import ConfigError, LiveStatus, WeighbridgeError
 from weighbridge.live import Alert, Mqtt, parse_broker
 from weighbridge.live.outputs.outbox import Outbox
-from weighbridge.live.weighing import KerbState
 
 amqtt_broker = pytest.importorskip("amqtt.broker", reason="amqtt is not installed")
 from amqtt.plugins.base import BasePlugin  # noqa: E402
@@ -196,7 +195,9 @@ def test_the_templates_of_home_assistant_fit_a_weighing(tmp_path):
     alert = Alert(2050.0)
     alert.look(weighing())
     w = weighing(
-        alerts=(alert.state(weighing()),), parked=True, kerb=KerbState(change=210.0, std=50.0)
+        alerts=(alert.state(weighing()),),
+        parked=True,
+        kerb=replace(weighing().kerb, change=210.0, std=50.0),
     )
     keys = ("mass", "status", "parked", "progress", "kerb_change")
     assert [shown(k, w) for k in keys] == ["2100.0", "weighed", "ON", "100.0", "210.0"]

@@ -14,9 +14,8 @@ from tests.noted import error, noted
 from tests.unit.made_weighings import NAMES, drive, rests, weighing
 
 from weighbridge import ConfigError
-from weighbridge.live import Page
+from weighbridge.live import Alert, Page
 from weighbridge.live.outputs.page import MOST, WINDOW, History
-from weighbridge.live.weighing import AlertState
 
 pytest.importorskip("starlette", reason="starlette is not installed")
 pytest.importorskip("uvicorn", reason="uvicorn is not installed")
@@ -348,10 +347,8 @@ def test_a_settled_weighing_that_is_a_little_older_clears_no_chart():
 @pytest.mark.filterwarnings("ignore::ResourceWarning")
 @pytest.mark.parametrize("width", [390, 1280])
 def test_an_active_alert_stands_above_the_mass(page, browser, width):
-    states = [
-        AlertState(limit=2000.0, side="above", active=active, probability=0.98)
-        for active in (True, False)
-    ]
+    told = Alert(2000.0).state(weighing())
+    states = [replace(told, active=active, probability=0.98) for active in (True, False)]
     page.show(weighing(gross=2000.0, alerts=(states[0],)))
     tab = browser.new_page(viewport={"width": width, "height": 844})
     tab.goto(page.name)

@@ -11,6 +11,7 @@ from tests.noted import noted
 from tests.unit.made_weighings import NAMES, drive, health, rests, weighing
 
 from weighbridge import LiveStatus, Problem
+from weighbridge.live import Alert
 from weighbridge.live.outputs.terminal import (
     PlainLines,
     TerminalView,
@@ -18,7 +19,6 @@ from weighbridge.live.outputs.terminal import (
     plain_line,
     terminal,
 )
-from weighbridge.live.weighing import AlertState
 
 
 def text(found):
@@ -138,7 +138,7 @@ def test_plain_lines_go_on_where_no_mass_has_a_time():
 
 
 def test_an_active_alert_is_the_first_line():
-    passed = AlertState(limit=2400.0, side="above", active=True, probability=0.97)
+    passed = replace(Alert(2400.0).state(weighing()), active=True, probability=0.97)
     w = weighing(alerts=(passed,), problems=(Problem.of("live.alert", alert="above 2400 kg"),))
     shown = [t.plain.strip() for t in lines(w, 60, 30)]
     assert next(line for line in shown if "2400 kg" in line).startswith(
