@@ -13,7 +13,7 @@ from weighbridge.cli.terminal import console, say
 from weighbridge.cli.verbosity import notice, watched
 
 if TYPE_CHECKING:
-    from weighbridge.live.emulator.played import Played
+    from weighbridge.live.emulator import Played
 
 _GLANCE: Final = 0.2
 _WITHOUT: Final = {
@@ -53,8 +53,7 @@ def emulate(
 
     Example: weighbridge emulate drive/ --rate 5
     """
-    from weighbridge.live.emulator.devices import devices
-    from weighbridge.live.emulator.played import Played
+    from weighbridge.live.emulator import Played, devices
 
     played = Played(load(drive, mapping, dbc), rate)
     stop = Event()
