@@ -8,7 +8,7 @@ import pytest
 import weighbridge as wb
 from weighbridge import Signal
 from weighbridge.simulation import Sensors, make_scenario, simulate_car
-from weighbridge.vehicle.air import Air, identify_air, standard_pressure
+from weighbridge.vehicle import Air, identify_air
 
 UP = 1600.0
 """By how much the drive is lifted [m]."""
@@ -16,13 +16,19 @@ UP = 1600.0
 STEP = 1.0 / 255.0
 """Of PID 04 [-]."""
 
+
+def pressure_at(height):
+    """Pressure of the standard atmosphere at heights [m] (ISO 2533), over that at the sea [-]."""
+    return (1.0 - 0.0065 * height / 288.15) ** 5.2559
+
+
 OTHERS = ("engine_torque", "engine_torque_fraction", "reference_torque", "lambda_1")
 
 
 def lifted(drive, power, height=UP):
     """Return the drive at another height; its load grows as its torque falls with the charge."""
     ground = drive.signals["altitude"]
-    low, high = (float(np.median(standard_pressure(ground.values + h))) for h in (0.0, height))
+    low, high = (float(np.median(pressure_at(ground.values + h))) for h in (0.0, height))
     load, pressure = drive.signals["engine_load"], drive.signals["barometric_pressure"]
     seen = np.clip(load.values * (low / high) ** power, 0.0, 1.0)
     return drive.with_signals(

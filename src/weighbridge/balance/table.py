@@ -16,7 +16,8 @@ from weighbridge.balance.foot_setup import FootSetup
 from weighbridge.messages import Problem
 from weighbridge.navigation import Motion
 from weighbridge.signals import Bools, Floats, Ints
-from weighbridge.vehicle.air import Air, dynamic_pressure
+from weighbridge.vehicle import Air
+from weighbridge.vehicle.air import dynamic_pressure
 
 if TYPE_CHECKING:
     from weighbridge.navigation.identify.setup import Setup

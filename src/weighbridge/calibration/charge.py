@@ -12,8 +12,7 @@ from weighbridge.calibration.problem import Problem
 from weighbridge.calibration.recording import Recording
 from weighbridge.estimators import joint
 from weighbridge.estimators.judging import USUAL_SLOPE
-from weighbridge.vehicle import Vehicle
-from weighbridge.vehicle.air import identify_air
+from weighbridge.vehicle import Vehicle, identify_air
 
 APART: Final = 0.04
 """Charges of the drives that differ by less show nothing [-]: 350 m of height."""

@@ -30,8 +30,8 @@ from weighbridge.vehicle import (
     TorqueSource,
     Vehicle,
     VehicleClass,
+    identify_air,
 )
-from weighbridge.vehicle.air import identify_air
 from weighbridge.vehicle.as_read import as_read
 from weighbridge.vehicle.engine_delay import find_engine_delay, gathered_delay
 from weighbridge.vehicle.gear import GearDetection, detect_gearings, idling, stepless_range

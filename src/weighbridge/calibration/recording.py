@@ -20,8 +20,7 @@ from weighbridge.balance.table import ForceTable
 from weighbridge.kernels.first_order import first_order
 from weighbridge.navigation import Motion
 from weighbridge.signals import Bools, Drive, Floats, Signal
-from weighbridge.vehicle import TorqueSource, Vehicle
-from weighbridge.vehicle.air import air_density, identify_air
+from weighbridge.vehicle import TorqueSource, Vehicle, air_density, identify_air
 from weighbridge.vehicle.torque import DRAGGED_TIME, averaged, in_air
 
 ANCHORS: Final = 0.4

@@ -22,8 +22,7 @@ from weighbridge.estimators.track import Status
 from weighbridge.navigation import Motion, find_motion, without_accelerometer
 from weighbridge.signals import Drive, Floats
 from weighbridge.signals.instants import instant
-from weighbridge.vehicle import Vehicle
-from weighbridge.vehicle.air import air_density
+from weighbridge.vehicle import Vehicle, air_density
 from weighbridge.visible import visible_json
 
 WINDOW: Final = 10.0

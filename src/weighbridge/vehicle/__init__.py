@@ -1,5 +1,6 @@
 """The vehicle: what its file says, gears, torque sources, classes."""
 
+from weighbridge.vehicle.air import Air, air_density, identify_air
 from weighbridge.vehicle.classes import VEHICLE_CLASSES, VehicleClass
 from weighbridge.vehicle.driveline import Driveline, Mounting, RoadLoad
 from weighbridge.vehicle.file import save_vehicle
@@ -20,6 +21,7 @@ from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
 __all__ = [
     "TORQUE_SOURCES",
     "VEHICLE_CLASSES",
+    "Air",
     "DraggedReading",
     "Driveline",
     "Known",
@@ -35,6 +37,8 @@ __all__ = [
     "TorqueTerms",
     "Vehicle",
     "VehicleClass",
+    "air_density",
     "describe",
+    "identify_air",
     "save_vehicle",
 ]
