@@ -22,7 +22,6 @@ from weighbridge.calibration import (
     run_speed_calibration,
     self_weighing,
 )
-from weighbridge.calibration.run import unfound_gears
 from weighbridge.cli.calibrate import speed_table, table
 from weighbridge.simulation import (
     Scenario,
@@ -235,12 +234,19 @@ def test_single_speed_without_engine_speed(electric, motor):
     assert car.provenance.r_squared > 0.97
 
 
-def test_measured_gear_signal(empty):
+@pytest.mark.parametrize("more", [False, True])
+def test_measured_gear_signal(empty, more):
     truth = empty.truth
     told = np.where(truth.phase == 0.0, truth.gear, 0.0)
+    highest = np.flatnonzero(told == 6.0)
+    told[highest[: highest.size // 2]] += more
+    # So few rows name none.
+    told[:5] = 9.0
     drive = empty.drive.with_signals(Signal("gear", truth.time[::5].copy(), told[::5].copy()))
     car = calibrate(drive, settings=CalibrationSettings(method="rls"))
     assert weigh(drive, car).mass == pytest.approx(truth.mass.mean(), rel=0.02)
+    assert says(car.provenance.notes, "calibration.gears") == more
+    assert says(car.provenance.notes, "calibration.gears", named=7, found=6) == more
 
 
 def test_gear_ratios_of_another_vehicle_are_refused(empty, car):
@@ -253,18 +259,6 @@ def test_gear_ratios_of_another_vehicle_are_refused(empty, car):
     at_cruise = 100.0 / 3.6 * 30.0 / np.pi
     assert min(abs(told["seen"] / at_cruise / g - 1.0) for g in car.driveline.gearings) < 0.02
     assert min(abs(told["expected"] / at_cruise / g - 1.0) for g in of_another) < 1e-6
-
-
-def test_gears_that_are_named_and_not_found_are_told(empty):
-    time = np.arange(100.0)
-    gears = np.where(time < 2, 9, 1 + np.arange(100) % 8)
-    drive = empty.drive.with_signals(Signal("gear", time, gears.astype(float)))
-    assert unfound_gears([drive, drive], 8) is None
-    assert unfound_gears([drive], 8) is None
-    said = unfound_gears([drive], 7)
-    assert said.id == "calibration.gears"
-    assert (said.values["named"], said.values["found"]) == (8, 7)
-    assert unfound_gears([empty.drive.without("gear")], 3) is None
 
 
 def test_percent_of_a_reference_torque(empty, measured, tmp_path):
