@@ -11,13 +11,18 @@ from weighbridge import Drive, Signal, Vehicle
 from weighbridge.balance.law import mass_column
 from weighbridge.estimators import ESTIMATORS
 from weighbridge.simulation import MIDSIZE, Polling, Scenario, Sensors, short_route, simulate_car
-from weighbridge.vehicle import Driveline
-from weighbridge.vehicle.fuel import DENSITY, SEEN, Burnt, fuel_burnt, fuel_flow
+from weighbridge.vehicle import Burnt, Driveline, fuel_burnt, fuel_flow
 
 joint = ESTIMATORS["joint"]
 
 GEARED = Vehicle(kind="car", driveline=Driveline(gearings=(12.0, 7.0, 4.0)))
 HOUR = np.arange(0.0, 3600.5, 0.5)
+
+DENSITY = 790.0
+"""Of the middle of petrol and diesel [kg/m^3]."""
+
+SEEN = 10.0
+"""Of a gap between two rows no more is counted [s]."""
 
 
 def drive(**signals):

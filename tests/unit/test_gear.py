@@ -9,7 +9,7 @@ from tests.noted import refused
 import weighbridge as wb
 from weighbridge import Signal
 from weighbridge.calibration.problem import find_gears
-from weighbridge.vehicle.engine_delay import find_engine_delay, gathered_delay
+from weighbridge.vehicle import find_engine_delay, gathered_delay
 from weighbridge.vehicle.gear import (
     detect_gearings,
     idling,

@@ -28,9 +28,18 @@ from weighbridge.balance.table import ForceBalance, ForceSetup, ForceTable, Reas
 from weighbridge.navigation import BY_SPEED, Motion
 from weighbridge.signals import Bools, Drive, Floats, Signal
 from weighbridge.signals.recent import looking
-from weighbridge.vehicle import Air, DraggedReading, Vehicle, air_density, identify_air
+from weighbridge.vehicle import (
+    Air,
+    Burnt,
+    DraggedReading,
+    Vehicle,
+    air_density,
+    fuel_burnt,
+    fuel_flow,
+    full_load_torque,
+    identify_air,
+)
 from weighbridge.vehicle.air import dynamic_pressure
-from weighbridge.vehicle.fuel import Burnt, fuel_burnt, fuel_flow, full_load_torque
 from weighbridge.vehicle.torque import (
     EXPONENT_STEP,
     Torque,

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from weighbridge.balance.force_balance import ForceState, force_balance
 from weighbridge.errors import DriveError
-from weighbridge.vehicle.fuel import Burnt
+from weighbridge.vehicle import Burnt
 
 if TYPE_CHECKING:
     from weighbridge.balance.table import ForceSetup, ForceTable

@@ -19,8 +19,7 @@ from weighbridge.navigation import BY_SPEED, Motion
 from weighbridge.navigation.motion import nearest_row, row_before
 from weighbridge.signals import Bools, Drive, Floats, Ints, Signal
 from weighbridge.signals.runs import marked_runs
-from weighbridge.vehicle import Vehicle
-from weighbridge.vehicle.engine_delay import find_engine_delay
+from weighbridge.vehicle import Vehicle, find_engine_delay
 from weighbridge.vehicle.gear import (
     UNSLIPPED,
     effective_gearing,

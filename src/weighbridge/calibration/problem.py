@@ -30,10 +30,11 @@ from weighbridge.vehicle import (
     TorqueSource,
     Vehicle,
     VehicleClass,
+    find_engine_delay,
+    gathered_delay,
     identify_air,
 )
 from weighbridge.vehicle.as_read import as_read
-from weighbridge.vehicle.engine_delay import find_engine_delay, gathered_delay
 from weighbridge.vehicle.gear import GearDetection, detect_gearings, idling, stepless_range
 from weighbridge.vehicle.torque import part_of_a_hybrid, sources_of
 

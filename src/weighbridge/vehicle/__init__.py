@@ -3,7 +3,9 @@
 from weighbridge.vehicle.air import Air, air_density, identify_air
 from weighbridge.vehicle.classes import VEHICLE_CLASSES, VehicleClass
 from weighbridge.vehicle.driveline import Driveline, Mounting, RoadLoad
+from weighbridge.vehicle.engine_delay import find_engine_delay, gathered_delay
 from weighbridge.vehicle.file import save_vehicle
+from weighbridge.vehicle.fuel import FUEL_STD, Burnt, fuel_burnt, fuel_flow, full_load_torque
 from weighbridge.vehicle.known import Known, describe
 from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.provenance import Provenance
@@ -19,9 +21,11 @@ from weighbridge.vehicle.torque_source import TorqueSource, TorqueTerms
 from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
 
 __all__ = [
+    "FUEL_STD",
     "TORQUE_SOURCES",
     "VEHICLE_CLASSES",
     "Air",
+    "Burnt",
     "DraggedReading",
     "Driveline",
     "Known",
@@ -39,6 +43,11 @@ __all__ = [
     "VehicleClass",
     "air_density",
     "describe",
+    "find_engine_delay",
+    "fuel_burnt",
+    "fuel_flow",
+    "full_load_torque",
+    "gathered_delay",
     "identify_air",
     "save_vehicle",
 ]
