@@ -13,9 +13,10 @@ from weighbridge.balance import ForceTable, Reason
 from weighbridge.estimators.joint.confounded import inertia_relative_std
 from weighbridge.estimators.joint.slow_errors import DATA_SHEET_NAMES, NAMES, design, prior_std
 from weighbridge.estimators.judging import SQUAT_STD, uncalibrated_std
-from weighbridge.vehicle import Driveline, Provenance, TorqueModel
-from weighbridge.vehicle.data_sheet import (
-    ACCESSORY_POWER,
+from weighbridge.vehicle import (
+    Driveline,
+    Provenance,
+    TorqueModel,
     by_data_sheet,
     friction_coefficients,
     scale_std,
@@ -89,9 +90,9 @@ def test_friction_is_the_reading_at_idle_and_grows_as_printed():
 
         # Accessories take a power: 12.5 N m of the 40 at idle, 5 at 200 rad/s.
         def friction(speed, c=c):
-            return c[0] + c[1] * speed + c[2] * speed**2 - ACCESSORY_POWER / 200.0
+            return c[0] + c[1] * speed + c[2] * speed**2 - 1000.0 / 200.0
 
-        assert_allclose(friction(idle), 40.0 - ACCESSORY_POWER / idle)
+        assert_allclose(friction(idle), 40.0 - 1000.0 / idle)
         fast = 2000.0 * np.pi / 30.0
         assert_allclose(friction(fast) / friction(idle), growth, rtol=0.01)
     # No more than half of a small reading is taken for accessories.

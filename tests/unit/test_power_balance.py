@@ -16,8 +16,8 @@ from weighbridge.vehicle import (
     Provenance,
     RoadLoad,
     TorqueModel,
+    scale_std,
 )
-from weighbridge.vehicle.data_sheet import scale_std
 from weighbridge.vehicle.power_balance import METER_STD, by_power, find_power_balance
 
 VOLTS = 370.0

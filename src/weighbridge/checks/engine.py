@@ -12,8 +12,8 @@ from weighbridge.checks.needed import needed, of_torque, show
 from weighbridge.messages import phrase
 from weighbridge.signals import Drive, Problem, Signal
 from weighbridge.signals.correlation import correlation
-from weighbridge.vehicle import Vehicle
-from weighbridge.vehicle.data_sheet import FRICTION_PRESSURE, friction_coefficients
+from weighbridge.vehicle import Vehicle, friction_coefficients
+from weighbridge.vehicle.data_sheet import FRICTION_PRESSURE
 from weighbridge.vehicle.gear import LOWEST_GEARING, idling
 from weighbridge.vehicle.torque import source_of
 

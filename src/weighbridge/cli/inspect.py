@@ -113,7 +113,7 @@ def _weighable(found: Inspection) -> bool:
 
 def _next(found: Inspection, path: Path, parts: int, given: _Given) -> list[str]:
     """Say what to type next, by whether the vehicle file weighs or has to be calibrated first."""
-    from weighbridge.vehicle.data_sheet import by_data_sheet
+    from weighbridge.vehicle import by_data_sheet
     from weighbridge.vehicle.description import can_weigh
 
     if any(p.serious for p in found.problems):

@@ -203,7 +203,7 @@ def _ratios(text: str | None) -> tuple[float, ...]:
 def _print(path: Path, vehicle: Vehicle) -> None:
     from rich.table import Table
 
-    from weighbridge.vehicle.data_sheet import by_data_sheet
+    from weighbridge.vehicle import by_data_sheet
     from weighbridge.vehicle.description import can_weigh, tell
 
     table = Table(show_header=False, box=None, padding=(0, 2, 0, 0))

@@ -396,7 +396,7 @@ def result_table(
 
     A ``narrow`` one has the status alone, and not how long the drive was.
     """
-    from weighbridge.vehicle.data_sheet import by_data_sheet
+    from weighbridge.vehicle import by_data_sheet
     from weighbridge.vehicle.description import worth
 
     table = _table(narrow=narrow)

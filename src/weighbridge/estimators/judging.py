@@ -19,8 +19,7 @@ from weighbridge.estimators.track import MassTrack, Segment, Status
 from weighbridge.messages import Problem, phrase
 from weighbridge.navigation import BY_SPEED, Motion, MotionSource
 from weighbridge.signals import Bools, Floats
-from weighbridge.vehicle import Vehicle
-from weighbridge.vehicle.data_sheet import scale_std
+from weighbridge.vehicle import Vehicle, scale_std
 from weighbridge.vehicle.torque import source_of
 
 SLOW_TORQUE: Final = 1.5

@@ -13,8 +13,7 @@ from weighbridge.constants import GRAVITY
 from weighbridge.estimators.joint.slow_errors import RESISTANCE_STD
 from weighbridge.kernels import speed_torque_ekf as kernel
 from weighbridge.signals import Bools, Floats, Ints
-from weighbridge.vehicle import Vehicle
-from weighbridge.vehicle.data_sheet import by_data_sheet
+from weighbridge.vehicle import Vehicle, by_data_sheet
 
 ROLLING_STD: Final = RESISTANCE_STD / GRAVITY
 """Standard deviation of the slow error of the rolling coefficient [-]: a fifth of a car's."""

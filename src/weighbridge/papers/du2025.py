@@ -44,8 +44,7 @@ from weighbridge.papers.reproduced import Progress, Reproduced, rms
 from weighbridge.pipeline.weighing import weigh
 from weighbridge.report.table import Table
 from weighbridge.signals import Floats
-from weighbridge.vehicle import Vehicle
-from weighbridge.vehicle.data_sheet import wheel_efficiency
+from weighbridge.vehicle import Vehicle, wheel_efficiency
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -21,7 +21,7 @@ from weighbridge.report.text import (
     signed_kg,
     with_half,
 )
-from weighbridge.vehicle.data_sheet import by_data_sheet, scale_std
+from weighbridge.vehicle import by_data_sheet, scale_std
 from weighbridge.vehicle.description import can_weigh
 
 if TYPE_CHECKING:

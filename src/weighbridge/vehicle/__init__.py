@@ -2,6 +2,12 @@
 
 from weighbridge.vehicle.air import Air, air_density, identify_air
 from weighbridge.vehicle.classes import VEHICLE_CLASSES, VehicleClass
+from weighbridge.vehicle.data_sheet import (
+    by_data_sheet,
+    friction_coefficients,
+    scale_std,
+    wheel_efficiency,
+)
 from weighbridge.vehicle.driveline import Driveline, Mounting, RoadLoad
 from weighbridge.vehicle.engine_delay import find_engine_delay, gathered_delay
 from weighbridge.vehicle.file import save_vehicle
@@ -42,12 +48,16 @@ __all__ = [
     "Vehicle",
     "VehicleClass",
     "air_density",
+    "by_data_sheet",
     "describe",
     "find_engine_delay",
+    "friction_coefficients",
     "fuel_burnt",
     "fuel_flow",
     "full_load_torque",
     "gathered_delay",
     "identify_air",
     "save_vehicle",
+    "scale_std",
+    "wheel_efficiency",
 ]

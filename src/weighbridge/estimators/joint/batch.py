@@ -69,8 +69,7 @@ from weighbridge.estimators.track import MassTrack, Segment
 from weighbridge.kernels import disturbance
 from weighbridge.navigation import BY_SPEED, MotionSource
 from weighbridge.signals import Bools, Floats
-from weighbridge.vehicle import FUEL_STD, Vehicle
-from weighbridge.vehicle.data_sheet import by_data_sheet, scale_std
+from weighbridge.vehicle import FUEL_STD, Vehicle, by_data_sheet, scale_std
 
 BEYOND_STD: Final = 0.015
 """Relative standard deviation of a mass per unit of the logarithm by which it lies beyond

@@ -7,8 +7,7 @@ import math
 from weighbridge.balance.law import engine_inertia_column, wheel_inertia_column
 from weighbridge.estimators.squat import share_of_accel
 from weighbridge.signals import Bools, Floats
-from weighbridge.vehicle import Vehicle
-from weighbridge.vehicle.data_sheet import by_data_sheet
+from weighbridge.vehicle import Vehicle, by_data_sheet
 
 
 def inertia_relative_std(
