@@ -17,8 +17,7 @@ from weighbridge.calibration.inverse import (
     fit,
     fit_with_gusts,
 )
-from weighbridge.vehicle import TORQUE_SOURCES, VEHICLE_CLASSES, TorqueTerms
-from weighbridge.vehicle.torque import torque_rows
+from weighbridge.vehicle import TORQUE_SOURCES, VEHICLE_CLASSES, TorqueTerms, torque_rows
 
 TRUCK_AREA, TRUCK_ROLLING = 8.0, 0.008
 MASS, DRAG_AREA, ROLLING, ENGINE_INERTIA, WHEEL_INERTIA, RADIUS = 1400.0, 0.62, 0.01, 0.15, 5.0, 0.3

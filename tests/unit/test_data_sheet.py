@@ -18,11 +18,11 @@ from weighbridge.vehicle import (
     Provenance,
     TorqueModel,
     by_data_sheet,
+    engine_torque,
     friction_coefficients,
     scale_std,
     wheel_efficiency,
 )
-from weighbridge.vehicle.torque import engine_torque
 
 GEARS = (12.0, 7.0, 4.5, 3.2)
 

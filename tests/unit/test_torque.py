@@ -6,15 +6,7 @@ from numpy.testing import assert_allclose
 from tests.noted import error, refused
 
 from weighbridge import ConfigError, Drive, Signal, Vehicle
-from weighbridge.vehicle import TORQUE_SOURCES, TorqueModel
-from weighbridge.vehicle.torque import (
-    engine_torque,
-    knot_parts,
-    parameters,
-    reading_of,
-    rows_of,
-    torque_rows,
-)
+from weighbridge.vehicle import TORQUE_SOURCES, TorqueModel, engine_torque, reading_of, torque_rows
 
 TIME = np.arange(5.0)
 SPEED = np.array([100.0, 150.0, 200.0, 250.0, 700.0])
@@ -113,7 +105,8 @@ KNOTS = (120.0, 180.0, 260.0)
 
 
 def test_parts_of_the_knots_add_up_to_one_and_end_flat():
-    parts = knot_parts(np.array([50.0, 120.0, 150.0, 200.0, 900.0]), KNOTS)
+    turning = np.array([50.0, 120.0, 150.0, 200.0, 900.0])
+    parts = torque_rows(np.ones(5), turning, 0, knots=KNOTS)[:, -3:]
     assert_allclose(parts.sum(axis=1), 1.0)
     assert_allclose(parts[0], [1.0, 0.0, 0.0])
     assert_allclose(parts[2], [0.5, 0.5, 0.0])
@@ -126,11 +119,13 @@ def test_a_map_with_knots_is_undone_by_its_reading():
         knots=KNOTS, knot_slopes=(8.0, -5.0, 12.0),
     )  # fmt: skip
     load = np.array([0.1, 0.3, 0.5, 0.8, 0.95])
-    made = rows_of(model, load, SPEED) @ parameters(model)
-    assert_allclose(reading_of(made, SPEED, model), load, rtol=1e-9)
-    assert_allclose(
-        rows_of(model.scaled(1.1), load, SPEED) @ parameters(model.scaled(1.1)), 1.1 * made
+    recorded = drive(engine_load=load, engine_speed=SPEED)
+    made, more = (
+        engine_torque(recorded, Vehicle(torque=m), SPEED, TIME).torque
+        for m in (model, model.scaled(1.1))
     )
+    assert_allclose(reading_of(made, SPEED, model), load, rtol=1e-9)
+    assert_allclose(more, 1.1 * made)
 
 
 @pytest.mark.parametrize(

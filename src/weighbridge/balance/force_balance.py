@@ -34,20 +34,16 @@ from weighbridge.vehicle import (
     DraggedReading,
     Vehicle,
     air_density,
+    engine_torque,
     fuel_burnt,
     fuel_flow,
     full_load_torque,
     identify_air,
-)
-from weighbridge.vehicle.air import dynamic_pressure
-from weighbridge.vehicle.torque import (
-    EXPONENT_STEP,
-    Torque,
-    engine_torque,
     in_air,
     source_of,
-    source_signal,
 )
+from weighbridge.vehicle.air import dynamic_pressure
+from weighbridge.vehicle.torque import EXPONENT_STEP, Torque, source_signal
 
 ROUGH_NOISE: Final = 0.03
 """Noise of a torque of which the vehicle file says none, over the highest of the drive [-]."""

@@ -12,9 +12,8 @@ from weighbridge.messages import Problem
 from weighbridge.navigation import BY_SPEED
 from weighbridge.signals import Bools, Drive
 from weighbridge.signals.runs import marked_runs
-from weighbridge.vehicle import Vehicle
+from weighbridge.vehicle import Vehicle, source_of
 from weighbridge.vehicle.gear import STANDS
-from weighbridge.vehicle.torque import source_of
 
 IDLE_TORQUE: Final = 0.05
 """Torque that a standing engine may show, over the highest of the drive [-]."""

@@ -19,7 +19,7 @@ from weighbridge.navigation import BY_SPEED, Motion
 from weighbridge.navigation.motion import nearest_row, row_before
 from weighbridge.signals import Bools, Drive, Floats, Ints, Signal
 from weighbridge.signals.runs import marked_runs
-from weighbridge.vehicle import Vehicle, find_engine_delay
+from weighbridge.vehicle import Vehicle, find_engine_delay, source_of
 from weighbridge.vehicle.gear import (
     UNSLIPPED,
     effective_gearing,
@@ -29,7 +29,6 @@ from weighbridge.vehicle.gear import (
     shifting,
     spin_rate,
 )
-from weighbridge.vehicle.torque import source_of
 
 SLOWEST_GEARED: Final = 1.5
 """Below this speed gears, slip and torque are not separated [m/s]."""

@@ -40,9 +40,8 @@ from weighbridge.constants import (
     STANDARD_TEMPERATURE,
 )
 from weighbridge.signals import Floats
-from weighbridge.vehicle import Vehicle
+from weighbridge.vehicle import Vehicle, reading_of, rows_of, torque_rows
 from weighbridge.vehicle.data_sheet import USUAL_SPEED, wheel_share
-from weighbridge.vehicle.torque import reading_of, rows_of, torque_rows
 
 STANDARD_DENSITY: Final = STANDARD_PRESSURE / (GAS_CONSTANT_DRY_AIR * STANDARD_TEMPERATURE)
 """Of air at sea level [kg/m^3] (ISO 2533)."""

@@ -20,9 +20,8 @@ from weighbridge.signals import Bools, Drive, Floats, Ints, Signal
 from weighbridge.signals.correlation import correlations
 from weighbridge.signals.interpolation import interpolate
 from weighbridge.signals.robust import robust_fit, robust_fits
-from weighbridge.vehicle import SecondSignalRelation, Vehicle
+from weighbridge.vehicle import SecondSignalRelation, Vehicle, source_of
 from weighbridge.vehicle.air import standard_pressure
-from weighbridge.vehicle.torque import source_of
 
 WINDOW: Final = 3.0
 """Both sides are averaged over so long, at least three periods of the slowest signal [s]."""

@@ -24,8 +24,7 @@ from weighbridge.balance.second_signal import (
 from weighbridge.messages import Problem
 from weighbridge.signals import Drive, Floats
 from weighbridge.signals.robust import robust_fit, spread
-from weighbridge.vehicle import SecondSignalRelation, Vehicle
-from weighbridge.vehicle.torque import source_of
+from weighbridge.vehicle import SecondSignalRelation, Vehicle, source_of
 
 CLOSED: Final = 0.15
 """Part of the second signal's range, from its low end, where fuel is cut or the throttle closed

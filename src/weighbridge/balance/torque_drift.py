@@ -21,8 +21,7 @@ from weighbridge.navigation import BY_SPEED, Motion
 from weighbridge.signals import Drive, Floats, Signal
 from weighbridge.signals.interpolation import interpolate
 from weighbridge.signals.robust import median_of_three, median_slope, spread
-from weighbridge.vehicle import Vehicle
-from weighbridge.vehicle.torque import source_of
+from weighbridge.vehicle import Vehicle, source_of
 
 PIECE: Final = 240.0
 """Force and motion are compared over so long [s], every half of it anew."""

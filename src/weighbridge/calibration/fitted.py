@@ -16,9 +16,9 @@ from weighbridge.messages import Problem as Message
 from weighbridge.messages import refused
 from weighbridge.results.calibration import DelaySearch, FittedRows
 from weighbridge.signals import Floats
-from weighbridge.vehicle import DraggedReading, Vehicle
+from weighbridge.vehicle import DraggedReading, Vehicle, rows_of
 from weighbridge.vehicle.model import EARLIEST_TORQUE, LATEST_TORQUE
-from weighbridge.vehicle.torque import parameters, rows_of
+from weighbridge.vehicle.torque import parameters
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

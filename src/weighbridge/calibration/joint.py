@@ -46,8 +46,7 @@ from weighbridge.messages import phrase, refused
 from weighbridge.navigation import BY_SPEED
 from weighbridge.results.calibration import DelaySearch
 from weighbridge.signals import Floats
-from weighbridge.vehicle import Driveline, Provenance, RoadLoad, Timing, Vehicle
-from weighbridge.vehicle.torque import cold_torque_std
+from weighbridge.vehicle import Driveline, Provenance, RoadLoad, Timing, Vehicle, cold_torque_std
 
 LAGS: Final = (0.0, 0.1, 0.2, 0.3, 0.4)
 """Time constants of the reading's smoothing that are tried [s]. Longer ones pass for the smoothness

@@ -11,10 +11,9 @@ from weighbridge.constants import PETROL_HEATING_VALUE
 from weighbridge.errors import ConfigError
 from weighbridge.messages import Problem, phrase, refused
 from weighbridge.signals import Drive
-from weighbridge.vehicle import VEHICLE_CLASSES, Vehicle, scale_std
+from weighbridge.vehicle import VEHICLE_CLASSES, Vehicle, scale_std, source_of
 from weighbridge.vehicle.data_sheet import usual_efficiency
 from weighbridge.vehicle.fuel import SEEN
-from weighbridge.vehicle.torque import source_of
 
 POUND: Final = 0.45359237
 """[kg], by definition."""

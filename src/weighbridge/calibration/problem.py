@@ -33,10 +33,11 @@ from weighbridge.vehicle import (
     find_engine_delay,
     gathered_delay,
     identify_air,
+    part_of_a_hybrid,
+    sources_of,
 )
 from weighbridge.vehicle.as_read import as_read
 from weighbridge.vehicle.gear import GearDetection, detect_gearings, idling, stepless_range
-from weighbridge.vehicle.torque import part_of_a_hybrid, sources_of
 
 FEWEST_REPORTED: Final = 10
 """Samples of a gear below which a gear signal may be in error there."""

@@ -14,8 +14,7 @@ from weighbridge.estimators import joint
 from weighbridge.estimators.joint.problem import UNMODELLED
 from weighbridge.messages import Problem, phrase, refused
 from weighbridge.signals import Floats
-from weighbridge.vehicle import Vehicle
-from weighbridge.vehicle.torque import source_of
+from weighbridge.vehicle import Vehicle, source_of
 
 UNCERTAIN: Final = 0.06
 """A drive that weighs so much more or less than the others, by the file made of all, is reported

@@ -20,8 +20,8 @@ from weighbridge.balance.table import ForceTable
 from weighbridge.kernels.first_order import first_order
 from weighbridge.navigation import Motion
 from weighbridge.signals import Bools, Drive, Floats, Signal
-from weighbridge.vehicle import TorqueSource, Vehicle, air_density, identify_air
-from weighbridge.vehicle.torque import DRAGGED_TIME, averaged, in_air
+from weighbridge.vehicle import TorqueSource, Vehicle, air_density, identify_air, in_air
+from weighbridge.vehicle.torque import DRAGGED_TIME, averaged
 
 ANCHORS: Final = 0.4
 """Delays so far apart have a whole balance each [s]; those between take over what it says of

@@ -37,9 +37,16 @@ from weighbridge.messages import Problem as Message
 from weighbridge.messages import phrase, refused
 from weighbridge.results.calibration import DelaySearch
 from weighbridge.signals import Floats
-from weighbridge.vehicle import Driveline, Provenance, RoadLoad, Timing, TorqueModel, Vehicle
+from weighbridge.vehicle import (
+    Driveline,
+    Provenance,
+    RoadLoad,
+    Timing,
+    TorqueModel,
+    Vehicle,
+    source_of,
+)
 from weighbridge.vehicle.fits import RLS
-from weighbridge.vehicle.torque import source_of
 
 
 def fit_rls(problem: Problem) -> Fitted:

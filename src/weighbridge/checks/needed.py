@@ -9,8 +9,7 @@ import numpy as np
 from weighbridge.signals import QUANTITIES, Drive
 from weighbridge.signals.catalogue import IMU_SIGNALS
 from weighbridge.signals.units import scalar_from_si
-from weighbridge.vehicle import TORQUE_SOURCES, Vehicle
-from weighbridge.vehicle.torque import sources_of
+from weighbridge.vehicle import TORQUE_SOURCES, Vehicle, sources_of
 
 MOTION: Final = frozenset(
     (

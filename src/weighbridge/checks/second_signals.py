@@ -9,8 +9,7 @@ from weighbridge.balance.second_signal import BY_SIGNAL
 from weighbridge.checks.steps import check_steps
 from weighbridge.messages import phrase
 from weighbridge.signals import Drive, Problem
-from weighbridge.vehicle import Vehicle
-from weighbridge.vehicle.torque import source_of
+from weighbridge.vehicle import Vehicle, source_of
 
 
 def check_reading(drive: Drive, vehicle: Vehicle | None) -> tuple[Problem, ...]:

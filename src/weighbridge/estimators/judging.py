@@ -19,8 +19,7 @@ from weighbridge.estimators.track import MassTrack, Segment, Status
 from weighbridge.messages import Problem, phrase
 from weighbridge.navigation import BY_SPEED, Motion, MotionSource
 from weighbridge.signals import Bools, Floats
-from weighbridge.vehicle import Vehicle, scale_std
-from weighbridge.vehicle.torque import source_of
+from weighbridge.vehicle import Vehicle, scale_std, source_of
 
 SLOW_TORQUE: Final = 1.5
 """Rows further apart are reported, where stretches of them are too short [s]: of a van's torque

@@ -35,9 +35,8 @@ from weighbridge.papers.claims import Found, same
 from weighbridge.papers.jensen2022_printed import PrintedSettings
 from weighbridge.papers.point import ACCEL, DENSITY, GRADE, SPEED, point_table
 from weighbridge.signals import Floats
-from weighbridge.vehicle import Driveline, RoadLoad, TorqueModel, Vehicle
+from weighbridge.vehicle import Driveline, RoadLoad, TorqueModel, Vehicle, torque_rows
 from weighbridge.vehicle.gear import effective_gearing, predict_gear, ratio_density
-from weighbridge.vehicle.torque import torque_rows
 from weighbridge.vehicle.torque_sources import air_flow_torque
 
 MASS: Final = 1580.0

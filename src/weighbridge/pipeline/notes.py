@@ -12,9 +12,8 @@ from weighbridge.estimators.judging import grade_apart, lacks_accelerometer, sam
 from weighbridge.messages import Problem, phrase
 from weighbridge.results.reported import trailer_connected
 from weighbridge.signals import Drive
-from weighbridge.vehicle import Vehicle, wheel_efficiency
+from weighbridge.vehicle import Vehicle, part_of_a_hybrid, source_of, sources_of, wheel_efficiency
 from weighbridge.vehicle.data_sheet import needs_calibration
-from weighbridge.vehicle.torque import part_of_a_hybrid, source_of, sources_of
 
 
 def uncalibrated(vehicle: Vehicle, result: MassTrack) -> tuple[Problem, ...]:

@@ -64,10 +64,9 @@ from weighbridge.pipeline.notes import (
 )
 from weighbridge.results.weighing import MassResult
 from weighbridge.signals import Drive
-from weighbridge.vehicle import Vehicle
+from weighbridge.vehicle import Vehicle, source_of
 from weighbridge.vehicle.as_read import as_read
 from weighbridge.vehicle.power_balance import by_power
-from weighbridge.vehicle.torque import source_of
 
 if TYPE_CHECKING:
     from weighbridge.io.mapping import MappingSource

@@ -17,6 +17,17 @@ from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.provenance import Provenance
 from weighbridge.vehicle.ride import Ride
 from weighbridge.vehicle.speed_model import SpeedModel
+from weighbridge.vehicle.torque import (
+    cold_torque_std,
+    engine_torque,
+    in_air,
+    part_of_a_hybrid,
+    reading_of,
+    rows_of,
+    source_of,
+    sources_of,
+    torque_rows,
+)
 from weighbridge.vehicle.torque_model import (
     DraggedReading,
     SecondSignalRelation,
@@ -49,7 +60,9 @@ __all__ = [
     "VehicleClass",
     "air_density",
     "by_data_sheet",
+    "cold_torque_std",
     "describe",
+    "engine_torque",
     "find_engine_delay",
     "friction_coefficients",
     "fuel_burnt",
@@ -57,7 +70,14 @@ __all__ = [
     "full_load_torque",
     "gathered_delay",
     "identify_air",
+    "in_air",
+    "part_of_a_hybrid",
+    "reading_of",
+    "rows_of",
     "save_vehicle",
     "scale_std",
+    "source_of",
+    "sources_of",
+    "torque_rows",
     "wheel_efficiency",
 ]

@@ -16,8 +16,7 @@ from weighbridge.estimators.joint.problem import UNMODELLED, FilterInput
 from weighbridge.kernels import disturbance
 from weighbridge.messages import Problem
 from weighbridge.signals import Drive, Floats
-from weighbridge.vehicle import Vehicle
-from weighbridge.vehicle.torque import source_of
+from weighbridge.vehicle import Vehicle, source_of
 
 KNEE: Final = 0.55
 """Part of the highest torque above which it may read otherwise [-]: from lower ones on, a driver's

@@ -16,9 +16,8 @@ from weighbridge.estimators.regression import regression
 from weighbridge.kernels.disturbance import DisturbanceParams
 from weighbridge.navigation import BY_SPEED, Motion
 from weighbridge.signals import Bools, Floats
-from weighbridge.vehicle import Vehicle, by_data_sheet
+from weighbridge.vehicle import Vehicle, by_data_sheet, cold_torque_std
 from weighbridge.vehicle.data_sheet import offset_std
-from weighbridge.vehicle.torque import cold_torque_std
 
 Variance = TypeVar("Variance", float, Floats)
 
