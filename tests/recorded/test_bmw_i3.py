@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import weighbridge as wb
-from weighbridge.vehicle.power_balance import find_power_balance
+from weighbridge.vehicle import find_power_balance
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "bmw-i3"
 

@@ -13,7 +13,7 @@ from weighbridge import DriveError
 from weighbridge.checks import check_drive
 from weighbridge.kernels.rotation import euler_to_matrix
 from weighbridge.signals.recent import LONGEST_STEP
-from weighbridge.vehicle.gear import detect_gearings
+from weighbridge.vehicle import detect_gearings
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 CANEDGE, SEAT = EXAMPLES / "canedge", EXAMPLES / "seat-leon"

@@ -13,8 +13,7 @@ from weighbridge.calibration import run_calibration
 from weighbridge.navigation import find_motion
 from weighbridge.pipeline.forward import forward_weigh, identify_forward
 from weighbridge.simulation import Sensors, make_scenario, simulate_car
-from weighbridge.vehicle import Driveline
-from weighbridge.vehicle.gear import UNSLIPPED
+from weighbridge.vehicle import UNSLIPPED, Driveline
 
 
 def drive(payload, seed, name="cvt-calibration"):

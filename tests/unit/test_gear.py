@@ -9,9 +9,10 @@ from tests.noted import refused
 import weighbridge as wb
 from weighbridge import Signal
 from weighbridge.calibration.problem import find_gears
-from weighbridge.vehicle import find_engine_delay, gathered_delay
-from weighbridge.vehicle.gear import (
+from weighbridge.vehicle import (
     detect_gearings,
+    find_engine_delay,
+    gathered_delay,
     idling,
     number_reported_gears,
     predict_gear,

@@ -16,9 +16,10 @@ from weighbridge.vehicle import (
     Provenance,
     RoadLoad,
     TorqueModel,
+    by_power,
+    find_power_balance,
     scale_std,
 )
-from weighbridge.vehicle.power_balance import METER_STD, by_power, find_power_balance
 
 VOLTS = 370.0
 
@@ -78,7 +79,8 @@ def test_scale_and_losses_are_found_whatever_the_heater_takes(made, sign):
     assert found.scale == pytest.approx(1.1, abs=0.01)
     assert found.charging_positive == (sign < 0.0)
     assert found.possible
-    assert METER_STD < found.std < 0.03
+    # No surer than the meters of voltage and current.
+    assert 0.015 < found.std < 0.03
     # Neither way gives more than it takes: the scale lies between the two.
     assert found.driving < 1.1 < 1.0 / found.recuperating
 

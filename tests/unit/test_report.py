@@ -21,8 +21,7 @@ from weighbridge.navigation import Motion
 from weighbridge.navigation.geodesy import LocalFrame
 from weighbridge.report import mass_figure, write_report
 from weighbridge.results.calibration import Calibration, DelaySearch, FittedRows
-from weighbridge.vehicle import Driveline, Provenance, RoadLoad, TorqueModel
-from weighbridge.vehicle.gear import detect_gearings
+from weighbridge.vehicle import Driveline, Provenance, RoadLoad, TorqueModel, detect_gearings
 
 MASS = 1500.0
 GEARINGS = (40.0, 25.0, 16.0)

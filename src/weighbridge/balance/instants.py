@@ -19,16 +19,18 @@ from weighbridge.navigation import BY_SPEED, Motion
 from weighbridge.navigation.motion import nearest_row, row_before
 from weighbridge.signals import Bools, Drive, Floats, Ints, Signal
 from weighbridge.signals.runs import marked_runs
-from weighbridge.vehicle import Vehicle, find_engine_delay, source_of
-from weighbridge.vehicle.gear import (
+from weighbridge.vehicle import (
     UNSLIPPED,
+    Vehicle,
     effective_gearing,
+    find_engine_delay,
     number_reported_gears,
     predict_gear,
     reported_gear_numbers,
     shifting,
-    spin_rate,
+    source_of,
 )
+from weighbridge.vehicle.gear import spin_rate
 
 SLOWEST_GEARED: Final = 1.5
 """Below this speed gears, slip and torque are not separated [m/s]."""

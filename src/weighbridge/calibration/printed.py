@@ -27,9 +27,9 @@ from weighbridge.vehicle import (
     Timing,
     TorqueModel,
     Vehicle,
+    detect_gearings,
 )
 from weighbridge.vehicle.fits import RLS
-from weighbridge.vehicle.gear import detect_gearings
 
 GRID: Final = ("grid_drag_area", "grid_rolling", "grid_engine", "grid_wheels")
 """Settings of the grid, in the order of the road parameters."""

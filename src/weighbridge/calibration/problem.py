@@ -25,19 +25,22 @@ from weighbridge.signals import Drive, Floats
 from weighbridge.vehicle import (
     TORQUE_SOURCES,
     Driveline,
+    GearDetection,
     Mounting,
     TorqueModel,
     TorqueSource,
     Vehicle,
     VehicleClass,
+    detect_gearings,
     find_engine_delay,
     gathered_delay,
     identify_air,
+    idling,
     part_of_a_hybrid,
     sources_of,
+    stepless_range,
 )
 from weighbridge.vehicle.as_read import as_read
-from weighbridge.vehicle.gear import GearDetection, detect_gearings, idling, stepless_range
 
 FEWEST_REPORTED: Final = 10
 """Samples of a gear below which a gear signal may be in error there."""

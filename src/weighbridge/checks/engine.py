@@ -12,9 +12,9 @@ from weighbridge.checks.needed import needed, of_torque, show
 from weighbridge.messages import phrase
 from weighbridge.signals import Drive, Problem, Signal
 from weighbridge.signals.correlation import correlation
-from weighbridge.vehicle import Vehicle, friction_coefficients, source_of
+from weighbridge.vehicle import Vehicle, friction_coefficients, idling, source_of
 from weighbridge.vehicle.data_sheet import FRICTION_PRESSURE
-from weighbridge.vehicle.gear import LOWEST_GEARING, idling
+from weighbridge.vehicle.gear import LOWEST_GEARING
 
 # Engine speeds of an idle [rad/s], and coolant of an engine that is warm [K].
 _IDLE: Final = (45.0, 135.0)

@@ -11,8 +11,8 @@ from weighbridge.errors import DriveError
 from weighbridge.messages import phrase
 from weighbridge.signals import Drive, Floats, Problem
 from weighbridge.signals.instants import instant
-from weighbridge.vehicle import TorqueModel, Vehicle
-from weighbridge.vehicle.gear import detect_gearings, effective_gearing, steady
+from weighbridge.vehicle import TorqueModel, Vehicle, detect_gearings, effective_gearing
+from weighbridge.vehicle.gear import steady
 from weighbridge.vehicle.reported_torque import SAME_REFERENCE, reference_torques
 
 # Whoever changes vehicles takes longer than this [s], and the vehicle left stands.

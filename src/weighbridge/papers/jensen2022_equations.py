@@ -35,8 +35,16 @@ from weighbridge.papers.claims import Found, same
 from weighbridge.papers.jensen2022_printed import PrintedSettings
 from weighbridge.papers.point import ACCEL, DENSITY, GRADE, SPEED, point_table
 from weighbridge.signals import Floats
-from weighbridge.vehicle import Driveline, RoadLoad, TorqueModel, Vehicle, torque_rows
-from weighbridge.vehicle.gear import effective_gearing, predict_gear, ratio_density
+from weighbridge.vehicle import (
+    Driveline,
+    RoadLoad,
+    TorqueModel,
+    Vehicle,
+    effective_gearing,
+    predict_gear,
+    torque_rows,
+)
+from weighbridge.vehicle.gear import ratio_density
 from weighbridge.vehicle.torque_sources import air_flow_torque
 
 MASS: Final = 1580.0

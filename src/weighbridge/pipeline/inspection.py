@@ -35,8 +35,13 @@ from weighbridge.signals.catalogue import IMU_SIGNALS
 from weighbridge.signals.robust import resolution
 from weighbridge.signals.shown import in_html, in_lines, plural
 from weighbridge.signals.units import from_si
-from weighbridge.vehicle import TORQUE_SOURCES, TorqueSource, Vehicle, sources_of
-from weighbridge.vehicle.power_balance import find_power_balance
+from weighbridge.vehicle import (
+    TORQUE_SOURCES,
+    TorqueSource,
+    Vehicle,
+    find_power_balance,
+    sources_of,
+)
 from weighbridge.visible import visible_json
 
 GAP_PERIODS: Final = 5.0

@@ -64,9 +64,8 @@ from weighbridge.pipeline.notes import (
 )
 from weighbridge.results.weighing import MassResult
 from weighbridge.signals import Drive
-from weighbridge.vehicle import Vehicle, source_of
+from weighbridge.vehicle import Vehicle, by_power, source_of
 from weighbridge.vehicle.as_read import as_read
-from weighbridge.vehicle.power_balance import by_power
 
 if TYPE_CHECKING:
     from weighbridge.io.mapping import MappingSource

@@ -11,8 +11,7 @@ from weighbridge.balance import ForceBalance
 from weighbridge.signals import Floats, Ints, Problem
 from weighbridge.signals.robust import huber, spread
 from weighbridge.signals.units import scalar_from_si
-from weighbridge.vehicle import Vehicle
-from weighbridge.vehicle.gear import GearDetection
+from weighbridge.vehicle import GearDetection, Vehicle
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

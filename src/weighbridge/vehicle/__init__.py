@@ -12,8 +12,21 @@ from weighbridge.vehicle.driveline import Driveline, Mounting, RoadLoad
 from weighbridge.vehicle.engine_delay import find_engine_delay, gathered_delay
 from weighbridge.vehicle.file import save_vehicle
 from weighbridge.vehicle.fuel import FUEL_STD, Burnt, fuel_burnt, fuel_flow, full_load_torque
+from weighbridge.vehicle.gear import (
+    UNSLIPPED,
+    GearDetection,
+    detect_gearings,
+    effective_gearing,
+    idling,
+    number_reported_gears,
+    predict_gear,
+    reported_gear_numbers,
+    shifting,
+    stepless_range,
+)
 from weighbridge.vehicle.known import Known, describe
 from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle.power_balance import by_power, find_power_balance
 from weighbridge.vehicle.provenance import Provenance
 from weighbridge.vehicle.ride import Ride
 from weighbridge.vehicle.speed_model import SpeedModel
@@ -40,11 +53,13 @@ from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
 __all__ = [
     "FUEL_STD",
     "TORQUE_SOURCES",
+    "UNSLIPPED",
     "VEHICLE_CLASSES",
     "Air",
     "Burnt",
     "DraggedReading",
     "Driveline",
+    "GearDetection",
     "Known",
     "Mounting",
     "Provenance",
@@ -60,24 +75,34 @@ __all__ = [
     "VehicleClass",
     "air_density",
     "by_data_sheet",
+    "by_power",
     "cold_torque_std",
     "describe",
+    "detect_gearings",
+    "effective_gearing",
     "engine_torque",
     "find_engine_delay",
+    "find_power_balance",
     "friction_coefficients",
     "fuel_burnt",
     "fuel_flow",
     "full_load_torque",
     "gathered_delay",
     "identify_air",
+    "idling",
     "in_air",
+    "number_reported_gears",
     "part_of_a_hybrid",
+    "predict_gear",
     "reading_of",
+    "reported_gear_numbers",
     "rows_of",
     "save_vehicle",
     "scale_std",
+    "shifting",
     "source_of",
     "sources_of",
+    "stepless_range",
     "torque_rows",
     "wheel_efficiency",
 ]
