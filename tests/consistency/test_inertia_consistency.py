@@ -5,8 +5,7 @@ import pytest
 from scipy.stats import chi2
 
 from weighbridge import InertiaSettings
-from weighbridge.inertia import ride_samples
-from weighbridge.inertia.filter import run_filter
+from weighbridge.inertia import estimate, ride_samples
 from weighbridge.papers.nguyen2024 import suspension_of
 from weighbridge.simulation.ride import TRUCK, RideScenario, RideSensors, simulate_ride
 
@@ -34,7 +33,7 @@ def rides():
                 seed=int(rng.integers(1_000_000)),
             )
         )
-        track = run_filter(ride_samples(made.drive), ride, settings)
+        track = estimate(ride_samples(made.drive), ride, settings=settings)
         true = track.reference / made.inertias[-1]
         errors.append((track.alpha[-1] - true) / track.alpha_std[-1])
         late = track.time > 2.0

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from weighbridge.calibration.grid import TABLE_5, grid_search
+from weighbridge.calibration import TABLE_5, grid_search
 from weighbridge.calibration.regression import TorqueRows, driven_slope, fit
 from weighbridge.vehicle import VEHICLE_CLASSES
 

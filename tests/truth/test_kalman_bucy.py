@@ -7,8 +7,7 @@ from scipy.integrate import cumulative_trapezoid, solve_ivp
 from scipy.stats import truncnorm
 
 from weighbridge import InertiaFilter, InertiaSettings
-from weighbridge.inertia import RideSamples
-from weighbridge.inertia.filter import fixed_params, run_filter
+from weighbridge.inertia import RideSamples, estimate, fixed_params
 from weighbridge.kernels import inertia as kernel
 from weighbridge.kernels import kalman_bucy
 from weighbridge.papers.nguyen2024 import suspension_of
@@ -216,7 +215,7 @@ def test_covariance_stays_positive_definite(hz):
 def test_sample_by_sample_equals_batch_to_the_last_bit():
     ride = rough_ride(200, 10.0, seed=5)
     settings = InertiaSettings()
-    batch = run_filter(ride, RIDE, settings)
+    batch = estimate(ride, RIDE, settings=settings)
     live = InertiaFilter(RIDE, ride.period, settings)
     for k in range(ride.time.size):
         one = live.update(ride.time[k], ride.travel[k], ride.rate[k], ride.velocity[k])
@@ -289,10 +288,10 @@ def test_spike_of_a_velocity_moves_little():
     spiked = 0 * velocity
     spiked[1000] = 5.0
     settings = InertiaSettings()
-    still = run_filter(clean, RIDE, settings)
-    hit = run_filter(
+    still = estimate(clean, RIDE, settings=settings)
+    hit = estimate(
         RideSamples(time=ride.time, travel=clean.travel, rate=clean.rate, velocity=spiked),
         RIDE,
-        settings,
+        settings=settings,
     )
     assert np.max(np.abs(hit.velocity - still.velocity)) < 0.2

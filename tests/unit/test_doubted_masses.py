@@ -7,12 +7,8 @@ import numpy as np
 
 from weighbridge import Problem, Vehicle
 from weighbridge.calibration import questionable_masses as module
-from weighbridge.calibration.questionable_masses import (
-    contradicting,
-    tared,
-    unbacked_scale,
-    with_findings,
-)
+from weighbridge.calibration import tared, with_findings
+from weighbridge.calibration.questionable_masses import contradicting, unbacked_scale
 from weighbridge.messages import phrase
 from weighbridge.vehicle import TorqueModel
 

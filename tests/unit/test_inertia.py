@@ -20,10 +20,14 @@ from weighbridge import (
     estimate_inertia,
     read_drive,
 )
-from weighbridge.inertia import RideSamples, ride_samples
-from weighbridge.inertia.filter import inverse_interval, run_filter
-from weighbridge.inertia.integration import integration_std
-from weighbridge.inertia.suspension import check_suspension
+from weighbridge.inertia import (
+    RideSamples,
+    check_suspension,
+    estimate,
+    integration_std,
+    inverse_interval,
+    ride_samples,
+)
 from weighbridge.papers.nguyen2024 import suspension_of
 from weighbridge.simulation.ride import TRUCK, RideScenario, RideSensors, simulate_ride
 
@@ -120,7 +124,7 @@ def test_a_filter_fed_sample_by_sample_ends_where_the_ride_does(made):
     live = InertiaFilter(RIDE, samples.period)
     for row in zip(samples.time, samples.travel, samples.rate, samples.velocity, strict=True):
         live.update(*row)
-    whole = run_filter(samples, RIDE, InertiaSettings())
+    whole = estimate(samples, RIDE, settings=InertiaSettings())
     assert np.array_equal(live.parameters, whole.parameters[-1])
     low, high = live.interval()
     assert np.all((low < live.parameters) & (live.parameters < high))

@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from tests.noted import error
 
 from weighbridge import ConfigError
-from weighbridge.calibration.grid import TABLE_5
+from weighbridge.calibration import TABLE_5
 from weighbridge.estimators.rls import RlsSettings, estimate, run_in_turn
 from weighbridge.papers import document, jensen2022, seed_of, settings_of
 from weighbridge.papers.jensen2022_drives import (

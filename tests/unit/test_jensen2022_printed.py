@@ -10,7 +10,7 @@ from tests.noted import error
 from weighbridge import ConfigError, DriveError, weigh
 from weighbridge.balance import Reason
 from weighbridge.balance.law import force_on_mass, mass_column
-from weighbridge.calibration.grid import TABLE_5
+from weighbridge.calibration import TABLE_5
 from weighbridge.estimators.rls import RlsSettings, parameters
 from weighbridge.kernels import ins_printed as kernel
 from weighbridge.kernels import rls

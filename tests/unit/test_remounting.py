@@ -8,7 +8,7 @@ import pytest
 from weighbridge import Signal, Vehicle
 from weighbridge.balance import force_balance
 from weighbridge.balance.law import drag_force
-from weighbridge.calibration.regression import build_rows
+from weighbridge.calibration import build_rows
 from weighbridge.navigation import find_motion
 from weighbridge.simulation import make_scenario, simulate_car
 from weighbridge.vehicle import Driveline, Mounting, TorqueModel

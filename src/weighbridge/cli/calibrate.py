@@ -145,8 +145,7 @@ def calibrate(
     Example: weighbridge calibrate drive-empty/ --mass 1580 -o car.toml
     """
     from weighbridge.arguments import check_choice
-    from weighbridge.calibration import CalibrationSettings, TrainingSettings
-    from weighbridge.calibration.questionable_masses import with_findings
+    from weighbridge.calibration import CalibrationSettings, TrainingSettings, with_findings
     from weighbridge.estimators.settings import changed, parsed
     from weighbridge.pipeline.given import dbcs_beside, mapping_beside
     from weighbridge.vehicle import TORQUE_SOURCES, Vehicle
@@ -239,7 +238,7 @@ def _counted(drives: int) -> str:
 
 def _with_tare(car: Vehicle, tare: float, lightest: float) -> Vehicle:
     """Return a vehicle with its mass without payload, checked by the lightest known mass [kg]."""
-    from weighbridge.calibration.questionable_masses import tared
+    from weighbridge.calibration import tared
     from weighbridge.errors import ConfigError
 
     if not 0.3 * lightest <= tare <= 1.02 * lightest:

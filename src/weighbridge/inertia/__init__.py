@@ -7,10 +7,15 @@ from weighbridge.inertia.filter import (
     InertiaTrack,
     Method,
     RideSamples,
+    accelerations,
+    estimate,
+    fixed_params,
+    inverse_interval,
 )
+from weighbridge.inertia.integration import integration_std
 from weighbridge.inertia.ride_checks import ride_samples
 from weighbridge.inertia.settings import UNKNOWN_FORCE_STD, InertiaSettings
-from weighbridge.inertia.suspension import PARTS, SuspensionCheck
+from weighbridge.inertia.suspension import PARTS, SuspensionCheck, check_suspension
 
 __all__ = [
     "AXES",
@@ -23,5 +28,11 @@ __all__ = [
     "Method",
     "RideSamples",
     "SuspensionCheck",
+    "accelerations",
+    "check_suspension",
+    "estimate",
+    "fixed_params",
+    "integration_std",
+    "inverse_interval",
     "ride_samples",
 ]

@@ -14,8 +14,7 @@ import numpy as np
 import pymap3d
 
 from weighbridge.balance import law
-from weighbridge.calibration.grid import grid_search
-from weighbridge.calibration.regression import build_rows
+from weighbridge.calibration import build_rows, grid_search
 from weighbridge.constants import (
     GRAVITY,
     PETROL_HEATING_VALUE,

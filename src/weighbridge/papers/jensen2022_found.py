@@ -10,7 +10,7 @@ import numpy as np
 from scipy.signal import find_peaks
 from scipy.stats import gaussian_kde
 
-from weighbridge.calibration.grid import TABLE_5
+from weighbridge.calibration import TABLE_5
 from weighbridge.estimators.rls import RlsSettings, run_in_turn
 from weighbridge.navigation import PrintedFilterSettings
 from weighbridge.papers.claims import Found, same

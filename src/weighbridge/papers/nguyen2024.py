@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from weighbridge.inertia import AXES, InertiaTrack, RideSamples, ride_samples
-from weighbridge.inertia.filter import estimate
+from weighbridge.inertia import AXES, InertiaTrack, RideSamples, estimate, ride_samples
 from weighbridge.papers.claims import Found, same
 from weighbridge.papers.nguyen2024_cases import (
     AS_IN_PRINT as AS_IN_PRINT,

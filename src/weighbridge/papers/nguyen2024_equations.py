@@ -11,8 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from weighbridge.inertia import Method
-from weighbridge.inertia.filter import accelerations, fixed_params
+from weighbridge.inertia import Method, accelerations, fixed_params
 from weighbridge.kernels import kalman_bucy
 from weighbridge.papers.claims import Found, same
 from weighbridge.papers.nguyen2024_cases import AS_PRINTED, PAPERS_SENSORS, Settings

@@ -27,10 +27,11 @@ from weighbridge.inertia import (
     Method,
     RideSamples,
     SuspensionCheck,
+    check_suspension,
+    estimate,
+    integration_std,
     ride_samples,
 )
-from weighbridge.inertia.filter import estimate
-from weighbridge.inertia.integration import integration_std
 from weighbridge.inertia.load_changes import believed_otherwise, jumps, load_changes
 from weighbridge.inertia.ride_checks import (
     LEAST,
@@ -41,14 +42,7 @@ from weighbridge.inertia.ride_checks import (
     nothing_moves,
     ride_of,
 )
-from weighbridge.inertia.suspension import (
-    SHORTEST,
-    attenuation,
-    body_tilt,
-    check_suspension,
-    response,
-    static_mass,
-)
+from weighbridge.inertia.suspension import SHORTEST, attenuation, body_tilt, response, static_mass
 from weighbridge.messages import Problem, phrase
 from weighbridge.pipeline.given import (
     GivenDrive,

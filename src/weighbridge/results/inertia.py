@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from weighbridge.estimators.track import Status
-from weighbridge.inertia import InertiaTrack, Method, SuspensionCheck
-from weighbridge.inertia.filter import inverse_interval
+from weighbridge.inertia import InertiaTrack, Method, SuspensionCheck, inverse_interval
 from weighbridge.messages import Explained
 from weighbridge.results.writing import check_level, number, write_track
 from weighbridge.signals import Drive, Floats, Problem
