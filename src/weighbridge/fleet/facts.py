@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from datetime import UTC, datetime
 from typing import Any, Final
 
 import numpy as np
 
 from weighbridge.balance.wheel_slip import wheel_slip
-from weighbridge.estimators import Segment, Status
 from weighbridge.estimators.joint.drag_area import shown_drag_area
 from weighbridge.fleet.schema import CHECKS
 from weighbridge.fleet.spans import Span, spans_of
 from weighbridge.fleet.trailers import SHOWN
 from weighbridge.fleet.travel import Travel
-from weighbridge.messages import Problem
 from weighbridge.pipeline.weighing import Weighing
 from weighbridge.results.row import WeighingRow
 from weighbridge.vehicle import Vehicle
@@ -64,43 +62,6 @@ def answer(row: WeighingRow) -> dict[str, Any]:
             for number, s in enumerate(row.segments)
         ],
     }
-
-
-def weighing_row(drive: Mapping[str, Any], segments: Sequence[Mapping[str, Any]]) -> WeighingRow:
-    """Return what `weigh` says from a row of a drive and its segments, in their order.
-
-    Spans without a segment of `weigh` are left out. Signals and spans of problems are not kept.
-    """
-    numbers: dict[str, Any] = {field: _float(drive[name]) for name, field in _NUMBERS.items()}
-    ids = drive["problem_ids"] or [None] * len(drive["warnings"])
-    return WeighingRow(
-        drive=drive["drive"],
-        vehicle=drive["vehicle"],
-        start=_text(drive["start"]),
-        method=drive["method"],
-        status=Status(drive["status"]),
-        refusal=_problem(drive["reason_id"], drive["reason"]) if drive["reason"] else None,
-        interval=(_float(drive["low95_kg"]), _float(drive["high95_kg"])),
-        problems=tuple(map(_problem, ids, drive["warnings"])),
-        segments=tuple(
-            Segment(
-                start=s["start_s"],
-                end=s["end_s"],
-                mass=_float(s["mass_kg"]),
-                std=_float(s["std_kg"]),
-            )
-            for s in segments
-            if s["start_s"] is not None
-        ),
-        load_changed=bool(drive["load_changed"]),
-        trailer_connected=drive["trailer_connected"],
-        **numbers,
-    )
-
-
-def _problem(id: str | None, text: str) -> Problem:
-    """Return a message; one of a store of before has no id of its own."""
-    return Problem.of("fleet.before", note=text) if id is None else Problem(id, text)
 
 
 def row_of(weighed: Weighing) -> dict[str, Any]:
@@ -201,13 +162,5 @@ def _date(start: str | None) -> Any:
     return None if found is None else found.date()
 
 
-def _text(start: datetime | None) -> str | None:
-    return None if start is None else start.isoformat(timespec="milliseconds")
-
-
 def _number(value: float) -> float | None:
     return None if math.isnan(value) else float(value)
-
-
-def _float(value: float | None) -> float:
-    return math.nan if value is None else value
