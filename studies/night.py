@@ -32,7 +32,9 @@ import numpy as np
 import polars as pl
 from night_clock import Clock, Off, on_clock
 from night_faults import APART, FORMS, Night, drawn
-from night_world import LOADS, SEED, Broker, Disk, Played, World, played, simulated
+from night_world import (
+    LOADS, SEED, Broker, Disk, Message, Played, World, marked, played, simulated,
+)  # fmt: skip
 from pages import filled
 
 import weighbridge as wb
@@ -227,7 +229,7 @@ class Run:
         self._mqtt: Mqtt | None = None
         self._stop: Any = None
         self._on = False
-        self._taken: Counter[tuple[str, bytes]] = Counter()
+        self._taken: Counter[Message] = Counter()
         self._checkpoints: dict[str, int] = {}
         self._written = -1
         self._written_at = -math.inf
@@ -345,9 +347,10 @@ class Run:
     def _note_unsure(self, box: Outbox) -> None:
         """Note what was confirmed a moment ago, or could not be removed from a full disk."""
         for number, topic, payload in box._database.execute("SELECT * FROM messages"):
-            at = self.broker.confirmed.get((topic, payload), -math.inf)
+            message = marked(topic, payload)
+            at = self.broker.confirmed.get(message, -math.inf)
             if number in box._removed or at > self.clock.now - 1.0:
-                self.broker.unsure[topic, payload] += 1
+                self.broker.unsure[message] += 1
 
     def run(self, until: float) -> None:
         """Let all run until an instant [s]."""
@@ -554,7 +557,7 @@ class Run:
             if run.clock.powerless:
                 return  # What it would do on its way out, a host without power does not.
             put(box, messages)
-            taken.update((topic, bytes(payload)) for topic, payload in messages)
+            taken.update(marked(topic, bytes(payload)) for topic, payload in messages)
             run.digest.add(run.clock.now, messages)
 
         def checkpoint_noted(scale: LiveScale) -> str:
@@ -591,11 +594,12 @@ class Run:
     # The judgement.
 
     def _judge_messages(self) -> None:
-        heard: Counter[tuple[str, bytes]] = Counter()
-        for at, topic, payload in self.broker.heard:
-            self.digest.add(at, topic, payload)
+        heard: Counter[Message] = Counter()
+        for at, message in self.broker.heard:
+            topic = message[0]
+            self.digest.add(at, *message)
             if topic.startswith("fleet/") and not topic.endswith("available"):
-                heard[topic, payload] += 1
+                heard[message] += 1
         for message, count in self._taken.items():
             if heard[message] < count:
                 self.judged.blame(
@@ -632,12 +636,9 @@ def _sum(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def _of(message: tuple[str, bytes]) -> str:
-    topic, payload = message
-    if not topic.endswith("weighing"):
-        return topic
-    said = json.loads(payload)
-    return f"weighing of {said['time_s']} s"
+def _of(message: Message) -> str:
+    topic, at, _ = message
+    return f"weighing of {at} s" if at else topic
 
 
 def _start(drive: wb.Drive) -> float:
