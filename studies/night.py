@@ -33,7 +33,16 @@ import polars as pl
 from night_clock import Clock, Off, on_clock
 from night_faults import APART, FORMS, Night, drawn
 from night_world import (
-    LOADS, SEED, Broker, Disk, Message, Played, World, marked, played, simulated,
+    LOADS,
+    SEED,
+    Broker,
+    Disk,
+    Message,
+    Played,
+    World,
+    marked,
+    played,
+    simulated,
 )  # fmt: skip
 from pages import filled
 
