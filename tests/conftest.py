@@ -198,15 +198,19 @@ def assert_damage_is_told(
 
 
 @pytest.fixture(scope="module")
-def chromium():
-    """Headless Chromium of playwright, one for a file of tests."""
+def chromium(tmp_path_factory):
+    """Headless Chromium of playwright, one for a file of tests, and one at a time: it is large."""
     sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    fcntl = pytest.importorskip("fcntl", reason="no files are locked here")
     if CHROMIUM is None:
         pytest.skip("no Chromium is installed")
-    with sync_api.sync_playwright() as play:
-        started = play.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-        yield started
-        started.close()
+    turn = tmp_path_factory.getbasetemp().parent / "chromium.turn"
+    with turn.open("w") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        with sync_api.sync_playwright() as play:
+            started = play.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+            yield started
+            started.close()
 
 
 @pytest.fixture
