@@ -73,7 +73,7 @@ from weighbridge.signals.recent import LONGEST_STEP
 HERE = Path(__file__).parent
 MUTANTS = HERE / "night_mutants.csv"
 
-JUDGED, HOURS = 7413, 8.0
+JUDGED, HOURS = 7417, 8.0
 """The night of the page, and driving in it [h]; nobody looked at it before."""
 
 FARTHEST = 4.0
@@ -303,7 +303,11 @@ class Run:
                 recorder=recorder, aside=True,
             )  # fmt: skip
             self._stop = self._threads.Event()
-            self._session.run(self._stop)
+            try:
+                self._session.run(self._stop)
+            except WeighbridgeError as error:
+                self.judged.blame("crash", f"at {clock.now:.0f} s it ends with: {error}")
+                raise
         self._on, self._mqtt = False, None
 
     def end(self) -> None:
@@ -606,7 +610,8 @@ class Run:
         heard: Counter[Message] = Counter()
         for at, message in self.broker.heard:
             topic = message[0]
-            self.digest.add(at, *message)
+            # What was put holds what is in it.
+            self.digest.add(at, *message[:2])
             if topic.startswith("fleet/") and not topic.endswith("available"):
                 heard[message] += 1
         for message, count in self._taken.items():

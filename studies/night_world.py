@@ -34,6 +34,7 @@ from night_faults import Fault, Night
 from weighbridge.errors import SourceError
 from weighbridge.simulation import (
     MIDSIZE,
+    Effects,
     Scenario,
     Sensors,
     SimulatedDrive,
@@ -46,6 +47,12 @@ EPOCH = 1.79e9
 
 IMU_RATE = 25.0
 """Samples of the inertial sensor [Hz], sent in datagrams of `BURST` [s]."""
+
+BIAS = {
+    "accel_x": 0.04, "accel_y": -0.06, "accel_z": 0.05,
+    "gyro_x": 5e-3, "gyro_y": -4e-3, "gyro_z": 6e-3,
+}  # fmt: skip
+"""Of the sensor, the same in all drives [m/s^2, rad/s]."""
 
 BURST = 1.0
 BUS_RATE = 10.0
@@ -84,6 +91,15 @@ class Played:
         """Return the mass after so long [kg, s]."""
         return float(np.interp(at, *self.truth))
 
+    def fix(self, at: float) -> tuple[float, ...]:
+        """Return the fix after so long, between those of the drive [s]."""
+        second = min(int(at), len(self.fixes) - 2)
+        part = min(at - second, 1.0)
+        before, after = self.fixes[second], self.fixes[second + 1]
+        turn = (after[4] - before[4] + 180.0) % 360.0 - 180.0
+        straight = (a + part * (b - a) for a, b in zip(before[:4], after[:4], strict=True))
+        return (*straight, before[4] + part * turn)
+
 
 def simulated(payload: float, seed: int) -> SimulatedDrive:
     """Simulate a drive through a town, which the devices play."""
@@ -92,6 +108,7 @@ def simulated(payload: float, seed: int) -> SimulatedDrive:
     scenario = Scenario(
         name=f"night-{seed}", car=MIDSIZE, route=short_route(), payload=payload,
         sensors=Sensors(imu_rate=IMU_RATE), seed=seed,
+        effects=replace(Effects(), imu_bias=0.0),
     )  # fmt: skip
     return simulate_car(replace(scenario, polling=replace(scenario.polling, rate=BUS_RATE)))
 
@@ -101,8 +118,7 @@ def played(made: SimulatedDrive) -> Played:
     drive = made.drive
     length = math.floor(drive.duration)
     at = np.arange(0.0, length, 1.0 / IMU_RATE)
-    axes = [np.interp(at, (s := drive.signals[f"{k}_{a}"]).time, s.values)
-            for k in ("accel", "gyro") for a in "xyz"]  # fmt: skip
+    axes = [np.interp(at, (s := drive.signals[name]).time, s.values) + BIAS[name] for name in BIAS]
     imu = [
         f'"accel":[{a:.4f},{b:.4f},{c:.4f}],"gyro":[{d:.5f},{e:.5f},{f:.5f}]}}\n'
         for a, b, c, d, e, f in zip(*axes, strict=True)
@@ -155,7 +171,7 @@ class World:
         self._faults: dict[str, list[Fault]] = {}
         for fault in night.faults:
             self._faults.setdefault(fault.kind, []).append(fault)
-        self._moved = self._places()
+        self._begins = self._places()
         self.set_by = 0.0
 
     def fails(self, kind: str, form: str) -> Fault | None:
@@ -219,16 +235,18 @@ class World:
         steps += [2.0 + 9000.0 * f.size**4 for f in self.begun("clock", "host set ahead", now)]
         return EPOCH + now + sum(steps) + self.set_by
 
-    def _places(self) -> list[tuple[float, float, float]]:
-        """Return by how much each trip is moved, so that it begins where the last one ended."""
-        moved, at = [], None
+    def _places(self) -> list[tuple[float, float, float, float]]:
+        """Return where each trip begins: where the last one ended, as its vehicle stood there.
+
+        Latitude [deg], longitude [deg], height [m], and by how much all courses are turned [deg].
+        """
+        places: list[tuple[float, float, float, float]] = []
+        end = (*self.bases[self.night.trips[0].base].fixes[0][:3], 0.0, 0.0)
         for trip in self.night.trips:
             fixes = self.bases[trip.base].fixes
-            shift = (0.0, 0.0, 0.0) if at is None else tuple(
-                a - b for a, b in zip(at, fixes[0][:3], strict=True))  # fmt: skip
-            moved.append(shift)
-            at = tuple(a + b for a, b in zip(fixes[-1][:3], shift, strict=True))
-        return moved
+            places.append((*end[:3], end[4] - fixes[0][4] if places else 0.0))
+            end = _placed(fixes[-1], fixes[0], places[-1])
+        return places
 
     # The inertial sensor.
 
@@ -297,11 +315,11 @@ class World:
             at = float(math.floor(fault.start))
         base, since, _ = self.played(at)
         trip = max(self.trip(at), 0)
-        row = base.fixes[min(int(since), len(base.fixes) - 1)]
+        row = base.fix(since)
         drives = self.night.trips[trip].start <= at < self.night.trips[trip].end
-        north, east, height = self._moved[trip]
-        latitude, longitude, height = row[0] + north, row[1] + east, row[2] + height
-        speed, course = (row[3], row[4]) if drives else (0.0, row[4])
+        latitude, longitude, height, speed, course = _placed(row, base.fixes[0], self._begins[trip])
+        if not drives:
+            speed = 0.0
         if self.fails("gnss", "elsewhere") is not None:
             latitude += 0.05
         date = EPOCH + number
@@ -332,6 +350,21 @@ class World:
     def adapter(self) -> Adapter:
         """Open the line to the adapter."""
         return Adapter(self)
+
+
+def _placed(
+    fix: tuple[float, ...], first: tuple[float, ...], place: tuple[float, float, float, float]
+) -> tuple[float, ...]:
+    """Turn and move a fix of a drive, whose first one is put at a place; see `World._places`."""
+    turn, wide = math.radians(place[3]), math.cos(math.radians(first[0]))
+    north, east = fix[0] - first[0], wide * (fix[1] - first[1])
+    return (
+        place[0] + math.cos(turn) * north - math.sin(turn) * east,
+        place[1] + (math.sin(turn) * north + math.cos(turn) * east) / wide,
+        place[2] + fix[2] - first[2],
+        fix[3],
+        fix[4] + place[3],
+    )
 
 
 def _angle(value: float, digits: int) -> str:
