@@ -72,6 +72,8 @@ from weighbridge.signals.recent import LONGEST_STEP
 
 HERE = Path(__file__).parent
 MUTANTS = HERE / "night_mutants.csv"
+NIGHTS = 5
+"""Short nights that a planted fault passes at most."""
 
 JUDGED, HOURS = 7417, 8.0
 """The night of the page, and driving in it [h]; nobody looked at it before."""
@@ -306,7 +308,8 @@ class Run:
             try:
                 self._session.run(self._stop)
             except WeighbridgeError as error:
-                self.judged.blame("crash", f"at {clock.now:.0f} s it ends with: {error}")
+                said = str(error).replace(str(self._root), "")
+                self.judged.blame("crash", f"at {clock.now:.0f} s it ends with: {said}")
                 raise
         self._on, self._mqtt = False, None
 
@@ -829,12 +832,13 @@ def mutants() -> str:
     missed = table.filter(pl.col("found by").is_null())["mutant"].to_list()
     lines = [
         f"`python studies/night_mutants.py` plants {len(table)} faults of one line, each in a copy "
-        "of the source, and lets up to three short nights with many faults pass. "
+        f"of the source, and lets up to {NIGHTS} short nights with many faults pass. "
         f"{len(table) - len(missed)} were found; ≥ 27 were asked for."
     ]  # fmt: skip
     lines += ["", "|planted|module|found by|", "|---|---|---|"]
     for name, path, by in table.rows():
-        lines.append(f"|{name}|`{path}`|{(by or '**nothing**').replace('|', ' ')}|")
+        # Which night, and the rule that it broke.
+        lines.append(f"|{name}|`{path}`|{':'.join(by.split(':')[:2]) if by else '**nothing**'}|")
     return "\n".join(lines)
 
 
