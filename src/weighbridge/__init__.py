@@ -8,9 +8,9 @@
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from weighbridge.first_use import at_first_use
 from weighbridge.version import VERSION
 
 __version__ = VERSION
@@ -59,6 +59,7 @@ _HOMES = {
     "calibrate": "weighbridge.calibration",
     "compare": "weighbridge.pipeline.weighing",
     "estimate_inertia": "weighbridge.pipeline.inertia",
+    "fleet": "weighbridge.fleet",
     "inspect_drive": "weighbridge.pipeline.inspection",
     "read_drive": "weighbridge.io",
     "read_drives": "weighbridge.io",
@@ -107,15 +108,7 @@ __all__ = [
     "with_elevation",
 ]
 
-
-def __getattr__(name: str) -> Any:
-    """Import the public names when they are first used, so that importing costs nothing."""
-    if name == "fleet":
-        return import_module("weighbridge.fleet")
-    home = _HOMES.get(name)
-    if home is None:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(home), name)
+__getattr__ = at_first_use(__name__, _HOMES)
 
 
 def __dir__() -> list[str]:

@@ -41,6 +41,7 @@ def install(folder):
     kernels.mkdir(parents=True)
     for name in (
         "__init__.py",
+        "first_use.py",
         "version.py",
         "constants.py",
         "kernels/__init__.py",

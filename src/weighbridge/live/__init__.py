@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from weighbridge.first_use import at_first_use
 
 if TYPE_CHECKING:
     from weighbridge.live.alerts import Alert
@@ -78,13 +79,7 @@ __all__ = [
     "parse_source",
 ]
 
-
-def __getattr__(name: str) -> Any:
-    """Import a name of the room when it is first used."""
-    home = _HOMES.get(name)
-    if home is None:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(home), name)
+__getattr__ = at_first_use(__name__, _HOMES)
 
 
 def __dir__() -> list[str]:

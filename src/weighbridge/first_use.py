@@ -1,0 +1,26 @@
+"""Public names of a package whose modules are imported when they are first used."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from importlib import import_module
+from typing import Any
+
+
+def at_first_use(package: str, homes: Mapping[str, str]) -> Callable[[str], Any]:
+    """Return the ``__getattr__`` of a package, so that importing the package costs nothing.
+
+    Parameters
+    ----------
+    package : its name
+    homes : module of each public name; of a public module the module itself
+    """
+
+    def found(name: str) -> Any:
+        home = homes.get(name)
+        if home is None:
+            raise AttributeError(f"module {package!r} has no attribute {name!r}")
+        module = import_module(home)
+        return module if home == f"{package}.{name}" else getattr(module, name)
+
+    return found
