@@ -359,6 +359,28 @@ def test_broken_mf4(tmp_path, content):
         read_drive(tmp_path / "log.mf4")
 
 
+def test_a_channel_without_a_unit_is_named_with_those_it_could_be_in(tmp_path):
+    from asammdf import MDF
+    from asammdf import Signal as Channel
+
+    path, time = tmp_path / "log.mf4", np.arange(0.0, 20.0, 0.1)
+    speed = Channel(np.full(time.size, 50.0), time, name="vehicle_speed", unit="")
+    engine = Channel(np.full(time.size, 2000.0), time, name="engine_speed", unit="rpm")
+    with MDF() as file:
+        file.append([speed, engine])
+        file.save(path)
+    drive = read_drive(path)
+    assert set(drive.signals) == {"engine_speed"}
+    (note,) = drive.problems
+    assert (note.id, note.values["name"]) == ("file.no_unit", "vehicle_speed")
+    assert "vehicle_speed_kmh" in note.text
+    with MDF() as file:
+        file.append([speed])
+        file.save(path, overwrite=True)
+    with error(DriveError, "vehicle_speed_kmh"):
+        read_drive(path)
+
+
 def test_mf4_without_its_extra(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "asammdf", None)
     (tmp_path / "log.mf4").write_bytes(b"MDF     ")

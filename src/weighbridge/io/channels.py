@@ -243,7 +243,8 @@ def log_of(path: Path, found: Recording, table: str | None, mapping: TableMappin
     if not wanted and (found.frames is None or not len(found.frames)):
         names = column_list({c.name: c for c in found.channels}) or "no channels"
         source = f"that {mapping.source} names" if mapping and mapping.signals else "that is known"
-        raise UnnamedError(f"{path} has no channel {source}; it has {names}", path)
+        why = "".join(f"; {p.text}" for p in log.problems if p.id == "file.no_unit")
+        raise UnnamedError(f"{path} has no channel {source}; it has {names}{why}", path)
     offset = mapping.time.offset if mapping is not None else 0.0
     clocks: dict[int, tuple[Floats, list[tuple[str, Floats]]]] = {}
     for name, (channel, suffix, signal) in wanted.items():
@@ -315,8 +316,12 @@ def _known(log: Log, found: Recording, table: str | None, taken: set[str]) -> _W
         name = _last(channel.name) if found.paths else channel.name
         try:
             column = parse_column(name, table, unit_suffix(channel.unit))
-        except UnitlessColumnError:
-            column = None
+        except UnitlessColumnError as e:
+            if channel.name not in taken:
+                log.problems.append(
+                    Problem.of("file.no_unit", file=log.path.name, name=channel.name, why=str(e))
+                )
+            continue
         if column is not None:
             wanted.setdefault(column[0].name, (channel, column[1], None))
         elif channel.name not in taken:
