@@ -32,6 +32,7 @@ import numpy as np
 import polars as pl
 from night_clock import Clock, Off, on_clock
 from night_faults import APART, FORMS, Night, drawn
+from night_mutants import SEEDS, TABLE
 from night_world import (
     LOADS,
     SEED,
@@ -71,9 +72,6 @@ from weighbridge.signals import DriveInfo
 from weighbridge.signals.recent import LONGEST_STEP
 
 HERE = Path(__file__).parent
-MUTANTS = HERE / "night_mutants.csv"
-NIGHTS = 5
-"""Short nights that a planted fault passes at most."""
 
 JUDGED, HOURS = 7417, 8.0
 """The night of the page, and driving in it [h]; nobody looked at it before."""
@@ -826,13 +824,13 @@ def _count(wrong: dict[str, list[str]], *kinds: str) -> str:
 
 def mutants() -> str:
     """Tell which planted faults short nights have found."""
-    if not MUTANTS.exists():
+    if not TABLE.exists():
         return "They were not run."
-    table = pl.read_csv(MUTANTS)
+    table = pl.read_csv(TABLE)
     missed = table.filter(pl.col("found by").is_null())["mutant"].to_list()
     lines = [
         f"`python studies/night_mutants.py` plants {len(table)} faults of one line, each in a copy "
-        f"of the source, and lets up to {NIGHTS} short nights with many faults pass. "
+        f"of the source, and lets up to {len(SEEDS)} short nights with many faults pass. "
         f"{len(table) - len(missed)} were found; ≥ 27 were asked for."
     ]  # fmt: skip
     lines += ["", "|planted|module|found by|", "|---|---|---|"]

@@ -59,7 +59,7 @@ def check_rates(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
 
 
 def without_slow(drive: Drive) -> Drive:
-    """Leave out an inertial sensor, or its accelerometer, that is too slow, where a speed is there.
+    """Leave out an inertial sensor, or an accelerometer alone, that is too slow beside a speed.
 
     Nothing filters what it samples, so that vibration passes for motion; see `SLOWEST`.
     """

@@ -204,8 +204,8 @@ def weighed(state, time, rows, columns, noise_var, added, params):
 def inflated(state, variance, params):
     """Return the state with ``variance`` (n,) added to those of the estimates.
 
-    A state that jumps is known by the first rows after it alone. One of them that is false would
-    close the gate to the right ones, so that it is open to some, as at the beginning.
+    Only the rows after a jump show a state that jumped. A false one among the first would close
+    the gate to the right ones. So the first ``jump_rows`` all pass, as at the beginning.
     """
     cov, rows = state.cov.copy(), state.rows
     for i in range(variance.size):

@@ -568,7 +568,7 @@ class LiveScale:
         why = "" if learned.refusal is None else learned.refusal.text
         _LOG.info("looked at %.0f s: %.0f kg %s", look.drive.duration, learned.mass, why)
         if learned.inconsistent:
-            # Records that show less later, after a restart say, do not make it right again.
+            # Fewer records, as after a restart, show no contradiction; the mass stays wrong.
             self._setup = self._state = None
         if math.isnan(learned.mass):
             return
