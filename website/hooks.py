@@ -13,7 +13,7 @@ from mkdocs.structure.files import File, Files
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from website import links, messages, notebooks, reference
+from website import checks, links, messages, notebooks, reference
 
 _DISPLAY = re.compile(r'<div class="arithmatex">\\\[(.*?)\\\]</div>', re.DOTALL)
 _INLINE = re.compile(r'<span class="arithmatex">\\\((.*?)\\\)</span>', re.DOTALL)
@@ -38,7 +38,7 @@ _WEIGHTS = (
 """How much more a page counts in the search than others, by the begin of its place."""
 
 
-_NUMBERS = ("papers.md",)
+_NUMBERS = ("papers.md", "reference/checks.md")
 """Pages that the search leaves out."""
 
 
@@ -48,6 +48,7 @@ def on_files(files: Files, config: Any) -> Files:
         **reference.python_pages(),
         "reference/commands.md": reference.commands_page(),
         "reference/messages.md": messages.messages_page(),
+        "reference/checks.md": checks.checks_page(),
         "licence.md": "# Licence\n\n" + (links.HOME / "LICENSE").read_text(encoding="utf-8"),
         **{
             f"downloads/{page.stem}.ipynb": notebooks.notebook(page)

@@ -26,13 +26,13 @@ def messages_page() -> str:
     for area, messages in groupby(catalogue().items(), key=lambda item: item[0].partition(".")[0]):
         lines += [f"## {area}", "", "| id | found | effect | what to do |", "|---|---|---|---|"]
         for id, parts in messages:
-            cells = [_shown(parts.get(part, "")) for part in ("text", "effect", "remedy")]
+            cells = [shown(parts.get(part, "")) for part in ("text", "effect", "remedy")]
             lines.append(f"| `{id}` | {' | '.join(cells)} |")
         lines.append("")
     return "\n".join(lines)
 
 
-def _shown(text: str) -> str:
+def shown(text: str) -> str:
     """Put an ellipsis in place of values; nothing of a sentence is a mark of Markdown."""
     text = _VALUE.sub("…", text.replace("{{", "(").replace("}}", ")"))
     return re.sub(r"([\\|*_<>`\[\]])", r"\\\1", text)

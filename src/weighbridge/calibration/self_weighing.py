@@ -40,6 +40,7 @@ SELF_CLOSE: Final = 5e-4
 """The calibration's own drives are weighed so near to their masses, in the mean [-]."""
 
 SELF_ROUNDS: Final = 4
+"""Rounds of scaling and weighing again, at most."""
 
 PARTS: Final = 3
 """Parts of each drive of a calibration that are weighed on their own, to see how they scatter."""

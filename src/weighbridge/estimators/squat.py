@@ -56,6 +56,7 @@ LEAST_ACCEL: Final = 0.15
 
 
 FEWEST_BLOCKS: Final = 4
+"""Fewer blocks of rows show no squat."""
 
 SPEED_SCALE_STD: Final = 0.015
 """Scale of the speed by the wheels, relative standard deviation [-]: that of the tyres' radius."""

@@ -101,6 +101,7 @@ def _grid() -> tuple[Floats, Floats, Floats, Floats]:
 
 _C, _P, _Q, _PRIOR = _grid()
 _X: Final = np.linspace(-0.5, 0.5, 101)
+"""Changes of load that are looked at, relative to the mass [-]."""
 
 
 class Learnt(NamedTuple):

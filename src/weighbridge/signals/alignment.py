@@ -28,9 +28,11 @@ LIKENESS: Final = 0.72
 AMBIGUOUS: Final = 0.5
 """Above this ratio of what is left unexplained, best over next best, two offsets are comparable."""
 
+# Part of the shorter signal that both have in common, at least [-].
 _SHARE: Final = 0.3
 # Two sensors do not agree better [part of the variance]: below, the ends of a record decide.
 _EXACT: Final = 0.005
+# Parts of the common time by which the scatter of the offset is found.
 _BLOCKS: Final = 12
 
 # Beyond a day of samples of 0.1 s the transform would fill the memory.

@@ -36,6 +36,7 @@ class Quantity:
 
 
 _C = 273.15
+"""0 °C [K]."""
 _WHEELS = {"fl": "front left", "fr": "front right", "rl": "rear left", "rr": "rear right"}
 
 _ROWS: Final = (

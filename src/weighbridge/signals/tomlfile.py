@@ -42,6 +42,7 @@ SMALLEST: Final = -340
 their part."""
 
 _LARGEST_BITS: Final = int(LARGEST * math.log2(10.0))
+"""The same in bits."""
 
 # Digits that are read: 800 show any double from its neighbour, exactly written (IEEE 754).
 _MOST_DIGITS: Final = 1000

@@ -35,6 +35,7 @@ PINNED_DIGITS: Final = 8
 do, each by itself."""
 
 _MOST_DIGITS: Final = 17
+"""Digits that show any double (IEEE 754)."""
 
 
 def rounded_texts(key: Key, part: Any, *, exact: bool) -> list[str]:

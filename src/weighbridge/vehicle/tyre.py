@@ -16,6 +16,7 @@ FULL_SECTION: Final = 82.0
 """Height over width of a tyre that states none, such as 195 R14 C [%]."""
 
 _INCH: Final = 0.0254
+"""One inch [m]."""
 
 _METRIC: Final = re.compile(
     r"""^\s*(?:LT|P|C)?\s*

@@ -52,6 +52,7 @@ _FLOOR: Final = (math.radians(0.3), math.radians(0.15), math.radians(3.0))
 """No block shows roll, pitch and yaw better than so [rad]."""
 
 _MOST_CHANGES: Final = 8
+"""More changes in one drive are a device that lies loose, and are not followed."""
 
 _JUMP_STD: Final = (0.02, 0.05)
 """Standard deviation of pitch and yaw of a mounting found by blocks [rad]."""
@@ -61,6 +62,7 @@ _CREEP_STD: Final = 0.003
 
 _PITCH: Final = 1
 _YAW: Final = 2
+"""Places among roll, pitch and yaw."""
 
 Complexes = NDArray[np.complex128]
 
