@@ -11,7 +11,6 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 import pymap3d
-from scipy.signal import lfilter
 
 from weighbridge.constants import GRAVITY
 from weighbridge.errors import ConfigError, DriveError
@@ -190,7 +189,7 @@ def printed_motion(
 def _laid_out(time: Floats, found: Floats, fixes: Fixes, settings: PrintedFilterSettings) -> Motion:
     """Smooth the specific force as sec. 7.1 has it, and take all to an even clock."""
     weights = np.arange(settings.window, 0.0, -1.0)
-    smooth = lfilter(weights / weights.sum(), [1.0], found[:, 0])
+    smooth = np.convolve(found[:, 0], weights / weights.sum())[: time.size]
     period = _STRIDE * float(np.median(np.diff(time)))
     even = np.arange(time[0], time[-1], period)
     rows = np.column_stack([np.interp(even, time, column) for column in found.T])
