@@ -27,7 +27,7 @@ import weighbridge as wb
 from weighbridge.errors import WeighbridgeError
 from weighbridge.live.replay import FASTEST_BLOCK
 from weighbridge.live.weighing import LiveStatus
-from weighbridge.signals.recent import LONGEST_STEP
+from weighbridge.signals import LONGEST_STEP
 
 HERE = Path(__file__).parent
 PAGE = HERE.parent / "docs" / "live_figures.md"

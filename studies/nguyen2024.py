@@ -28,7 +28,7 @@ from weighbridge.inertia.settings import InertiaSettings
 from weighbridge.papers import nguyen2024 as paper
 from weighbridge.pipeline.inertia import estimate_inertia
 from weighbridge.signals import Drive
-from weighbridge.simulation.ride import TRUCK, RideScenario, RideSensors, simulate_ride
+from weighbridge.simulation import TRUCK, RideScenario, RideSensors, simulate_ride
 from weighbridge.vehicle.model import Vehicle
 
 HERE = Path(__file__).parent

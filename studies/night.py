@@ -68,8 +68,7 @@ from weighbridge.live.sources.lines import LinesSource
 from weighbridge.live.sources.nmea import SentenceReader
 from weighbridge.live.sources.receiver import ReceiverSource
 from weighbridge.live.weighing import LiveStatus, LiveWeighing
-from weighbridge.signals import DriveInfo
-from weighbridge.signals.recent import LONGEST_STEP
+from weighbridge.signals import LONGEST_STEP, DriveInfo
 
 HERE = Path(__file__).parent
 

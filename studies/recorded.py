@@ -21,8 +21,7 @@ import polars as pl
 from openpyxl import load_workbook
 
 import weighbridge as wb
-from weighbridge.balance import force_balance
-from weighbridge.balance.averaging import windows
+from weighbridge.balance import force_balance, windows
 from weighbridge.balance.delay import estimate_torque_delay
 from weighbridge.balance.law import force_on_mass
 from weighbridge.estimators import joint

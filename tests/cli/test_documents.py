@@ -12,8 +12,7 @@ from website import running
 
 from weighbridge.cli import app
 from weighbridge.io import write_drive
-from weighbridge.simulation import make_scenario, simulate_car
-from weighbridge.simulation.ride import RideScenario, simulate_ride
+from weighbridge.simulation import RideScenario, make_scenario, simulate_car, simulate_ride
 
 HOME = Path(__file__).parents[2]
 DOCUMENTS = sorted(

@@ -14,7 +14,7 @@ import pytest
 from tests.noted import error, named
 
 from weighbridge import ConfigError, DriveError, Vehicle, read_drive
-from weighbridge.io.quiet import quietly
+from weighbridge.io import quietly
 from weighbridge.vehicle import Driveline, Mounting, Provenance, RoadLoad, SpeedModel, TorqueModel
 
 GOLDEN = Path(__file__).parent.parent / "golden"

@@ -7,7 +7,7 @@ from scipy.stats import chi2
 from weighbridge import InertiaSettings
 from weighbridge.inertia import estimate, ride_samples
 from weighbridge.papers.nguyen2024 import suspension_of
-from weighbridge.simulation.ride import TRUCK, RideScenario, RideSensors, simulate_ride
+from weighbridge.simulation import TRUCK, RideScenario, RideSensors, simulate_ride
 
 RUNS = 25
 

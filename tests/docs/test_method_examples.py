@@ -8,7 +8,7 @@ import pytest
 from website import running
 
 from weighbridge.io import write_drive
-from weighbridge.simulation.ride import TRUCK, RideScenario, simulate_ride
+from weighbridge.simulation import TRUCK, RideScenario, simulate_ride
 
 HOME = Path(__file__).parents[2]
 

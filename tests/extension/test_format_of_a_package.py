@@ -8,7 +8,7 @@ from tests.noted import error
 from tests.recipes import code, entry_points
 
 from weighbridge import DriveError, read_drive
-from weighbridge.io.formats import formats
+from weighbridge.io import formats
 
 READER = code("bang_logs.py")
 LINE = entry_points()["weighbridge.formats"].replace("FORMAT", "{name}")

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 from tests.noted import has
 
 from weighbridge import read_drive
-from weighbridge.io.formats import format_of
+from weighbridge.io import format_of
 
 HERE = Path(__file__).parent
 

@@ -12,9 +12,7 @@ from numpy.testing import assert_allclose
 from tests.noted import error, has
 
 from weighbridge import DriveError, MissingExtraError, read_drive
-from weighbridge.io.bus_draft import draft_bus
-from weighbridge.io.dbc import load_dbcs
-from weighbridge.io.formats import format_of
+from weighbridge.io import draft_bus, format_of, load_dbcs
 
 pytest.importorskip("capnp")
 zstandard = pytest.importorskip("zstandard")

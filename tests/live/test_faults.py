@@ -11,7 +11,7 @@ import weighbridge as wb
 from weighbridge import LiveStatus
 from weighbridge.errors import SourceError
 from weighbridge.live import Feed, Outputs, Replay, Session
-from weighbridge.signals.recent import LONGEST_STEP
+from weighbridge.signals import LONGEST_STEP
 
 IMU = tuple(f"{kind}_{axis}" for kind in ("accel", "gyro") for axis in "xyz")
 GNSS = ("latitude", "longitude", "altitude", "gnss_speed", "gnss_course", "hdop", "gnss_accuracy")

@@ -11,7 +11,7 @@ from tests.noted import named
 from weighbridge import DriveInfo, Vehicle
 from weighbridge.estimators.judging import STOP
 from weighbridge.live import Keeper, clock
-from weighbridge.signals.recent import BEHIND, STEP
+from weighbridge.signals import BEHIND, STEP
 from weighbridge.vehicle import Driveline
 
 

@@ -12,7 +12,7 @@ from tests.live.test_scale import blocks, even, fed
 from tests.live.test_session import Shown
 from weighbridge import LiveStatus
 from weighbridge.live import Feed, Outputs, Replay, Session, looking
-from weighbridge.signals.recent import LONGEST_STEP
+from weighbridge.signals import LONGEST_STEP
 
 
 @pytest.fixture

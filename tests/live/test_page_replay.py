@@ -9,7 +9,7 @@ import pytest
 import weighbridge as wb
 from weighbridge.live import Page
 from weighbridge.live.outputs.page import MOST
-from weighbridge.signals.recent import LONGEST_STEP
+from weighbridge.signals import LONGEST_STEP
 
 pytest.importorskip("starlette", reason="starlette is not installed")
 pytest.importorskip("uvicorn", reason="uvicorn is not installed")

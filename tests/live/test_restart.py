@@ -11,7 +11,7 @@ from tests.live.senders import HOST, Senders
 from tests.noted import says
 from weighbridge import LiveStatus
 from weighbridge.live.records import Records
-from weighbridge.signals.recent import LONGEST_STEP
+from weighbridge.signals import LONGEST_STEP
 
 
 class Heard:

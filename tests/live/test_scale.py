@@ -13,7 +13,7 @@ import weighbridge as wb
 from tests.live.conftest import PHONE
 from tests.noted import error
 from weighbridge import ConfigError, LiveStatus
-from weighbridge.balance.averaging import WINDOW
+from weighbridge.balance import WINDOW
 from weighbridge.estimators.judging import STOP
 from weighbridge.live.on_the_move import REST, OnTheMove
 from weighbridge.live.records import LATENESS
@@ -26,7 +26,7 @@ from weighbridge.pipeline.forward import (
     step,
     with_open,
 )
-from weighbridge.signals.recent import LONGEST_STEP, STEP, instants, recent
+from weighbridge.signals import LONGEST_STEP, STEP, instants, recent
 from weighbridge.simulation import MIDSIZE, Loading, Scenario, short_route, simulate_car
 
 

@@ -12,7 +12,7 @@ import weighbridge as wb
 from weighbridge import DriveError
 from weighbridge.checks import check_drive
 from weighbridge.kernels.rotation import euler_to_matrix
-from weighbridge.signals.recent import LONGEST_STEP
+from weighbridge.signals import LONGEST_STEP
 from weighbridge.vehicle import detect_gearings
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from weighbridge.balance import ForceTable
-from weighbridge.balance.averaging import WINDOW
+from weighbridge.balance import WINDOW, ForceTable
 from weighbridge.calibration.inverse import (
     DriveRows,
     FitSettings,

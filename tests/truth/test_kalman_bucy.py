@@ -11,7 +11,7 @@ from weighbridge.inertia import RideSamples, estimate, fixed_params
 from weighbridge.kernels import inertia as kernel
 from weighbridge.kernels import kalman_bucy
 from weighbridge.papers.nguyen2024 import suspension_of
-from weighbridge.simulation.ride import TRUCK, RideSensors
+from weighbridge.simulation import TRUCK, RideSensors
 
 RIDE = suspension_of(TRUCK, RideSensors(body_noise=(0.05, 0.05, 0.05)))
 SETTINGS = InertiaSettings(process=(1e-3, 0.3))

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from weighbridge.balance.averaging import WINDOW, windows
+from weighbridge.balance import WINDOW, windows
 from weighbridge.estimators.joint.slow_errors import motion_variance
 from weighbridge.navigation import find_motion
 from weighbridge.simulation import MIDSIZE, Scenario, short_route, simulate_car

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from weighbridge import read_drive
-from weighbridge.io.draft import draft
-from weighbridge.io.mapping_text import mapping_text
+from weighbridge.io import draft, mapping_text
 from weighbridge.signals import QUANTITIES
 from weighbridge.signals.units import to_si
 

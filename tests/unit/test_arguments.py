@@ -12,7 +12,7 @@ import weighbridge as wb
 from weighbridge import CalibrationSettings, ConfigError
 from weighbridge.papers.nguyen2024 import suspension_of
 from weighbridge.signals.units import unit
-from weighbridge.simulation.ride import TRUCK, RideSensors
+from weighbridge.simulation import TRUCK, RideSensors
 from weighbridge.vehicle import Driveline, TorqueModel
 
 WRONG = (3, 2.5, None, object(), [1, 2], {"a": 1}, b"x", {3}, np.arange(3.0), "\0")

@@ -12,9 +12,7 @@ from scipy.io import savemat
 from tests.noted import error
 
 from weighbridge import ConfigError, DriveError, MissingExtraError, read_drive
-from weighbridge.io import channels
-from weighbridge.io.formats import format_of
-from weighbridge.io.mapping_text import mapping_text
+from weighbridge.io import channels, format_of, mapping_text
 
 h5py = pytest.importorskip("h5py")
 nptdms = pytest.importorskip("nptdms")

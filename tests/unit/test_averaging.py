@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.testing import assert_allclose
 
-from weighbridge.balance.averaging import windows
+from weighbridge.balance import windows
 
 
 def test_windows_never_cross_an_unusable_row_or_a_pause():

@@ -6,10 +6,9 @@ from test_frames import make
 from tests.noted import error, refused, says
 
 from weighbridge import ConfigError
+from weighbridge.io import load_dbcs, load_mapping
 from weighbridge.io.bus import decode
-from weighbridge.io.dbc import load_dbcs
 from weighbridge.io.frames import Frames, join_frames
-from weighbridge.io.mapping import load_mapping
 
 
 def obd_speed(count, period):

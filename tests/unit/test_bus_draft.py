@@ -8,10 +8,7 @@ from tests.noted import error, refused, says
 
 from weighbridge import ConfigError, DriveError, read_drive
 from weighbridge.fleet.vehicles import Vehicles
-from weighbridge.io.bus_draft import draft_bus
-from weighbridge.io.dbc import load_dbcs
-from weighbridge.io.formats import format_of
-from weighbridge.io.mapping_text import mapping_text
+from weighbridge.io import draft_bus, format_of, load_dbcs, mapping_text
 
 DBC = """VERSION ""
 NS_ :

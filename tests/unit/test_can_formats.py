@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from tests.noted import error, has, refused
 
 from weighbridge import DriveError, MissingExtraError, read_drive
-from weighbridge.io.formats import format_of
+from weighbridge.io import format_of
 from weighbridge.io.frame_text import read_candump
 
 START = 1_600_000_000.0

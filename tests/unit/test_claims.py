@@ -10,7 +10,7 @@ import pytest
 from tests.noted import error
 
 from weighbridge import ConfigError
-from weighbridge.estimators.settings import changed, differences, parsed
+from weighbridge.estimators import changed, differences, parsed
 from weighbridge.papers import (
     PAPERS,
     Found,

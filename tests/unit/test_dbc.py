@@ -8,7 +8,8 @@ from test_frames import make
 from tests.noted import error
 
 from weighbridge import ConfigError
-from weighbridge.io.dbc import Found, find_signal, load_dbcs, message_frames, physical
+from weighbridge.io import load_dbcs
+from weighbridge.io.dbc import Found, find_signal, message_frames, physical
 
 
 def text(*messages):

@@ -8,7 +8,7 @@ import pytest
 
 from weighbridge import Drive, DriveInfo, Signal
 from weighbridge.checks import correct_drive
-from weighbridge.io.draft import draft
+from weighbridge.io import draft
 
 NAME = "longitudinal_accel"
 TIME = np.arange(0.0, 1200.0, 0.1)

@@ -8,9 +8,7 @@ import pytest
 from tests.noted import error
 
 from weighbridge import ConfigError, DriveError, WeighbridgeError, read_drive
-from weighbridge.io.draft import draft
-from weighbridge.io.mapping import load_mapping
-from weighbridge.io.mapping_text import mapping_text
+from weighbridge.io import draft, load_mapping, mapping_text
 
 ROWS = 400
 T = 0.25 * np.arange(ROWS)

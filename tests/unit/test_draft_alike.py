@@ -8,7 +8,7 @@ import polars as pl
 import pytest
 
 import weighbridge as wb
-from weighbridge.io.draft import draft
+from weighbridge.io import draft
 
 TIME = np.arange(0.0, 20.0, 0.1)
 

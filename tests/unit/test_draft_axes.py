@@ -5,8 +5,7 @@ import polars as pl
 import pytest
 
 from weighbridge import read_drives
-from weighbridge.io.draft import draft
-from weighbridge.io.mapping_text import mapping_text
+from weighbridge.io import draft, mapping_text
 
 T = np.arange(0.0, 60.0, 0.05)
 

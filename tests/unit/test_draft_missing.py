@@ -5,8 +5,7 @@ import pytest
 from tests.noted import error
 
 from weighbridge import DriveError, read_drive
-from weighbridge.io.draft import draft
-from weighbridge.io.mapping_text import mapping_text
+from weighbridge.io import draft, mapping_text
 from weighbridge.io.naming import recognise_all
 
 ROWS = 100

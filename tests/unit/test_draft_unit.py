@@ -7,9 +7,7 @@ import polars as pl
 import pytest
 
 from weighbridge import read_drive
-from weighbridge.io.draft import draft
-from weighbridge.io.formats import format_of
-from weighbridge.io.mapping_text import mapping_text
+from weighbridge.io import draft, format_of, mapping_text
 from weighbridge.signals.units import UNITS
 
 TIME = np.arange(0.0, 900.0, 0.5)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from weighbridge.io.draft import draft
+from weighbridge.io import draft
 
 DT = 0.5
 T = np.arange(0.0, 400.0, DT)

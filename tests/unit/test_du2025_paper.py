@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from weighbridge.estimators.settings import changed, parsed
+from weighbridge.estimators import changed, parsed
 from weighbridge.papers import Reproduced, du2025
 
 SEED = 3

@@ -8,8 +8,7 @@ import polars as pl
 import pytest
 
 from weighbridge import DriveError, read_drive
-from weighbridge.io.draft import draft
-from weighbridge.io.mapping_text import mapping_text
+from weighbridge.io import draft, mapping_text
 
 T = np.arange(0.0, 30.0, 0.1)
 

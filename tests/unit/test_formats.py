@@ -10,8 +10,7 @@ import pytest
 from tests.noted import error
 
 from weighbridge import ConfigError, DriveError, read_drive
-from weighbridge.io import FORMATS, Takes
-from weighbridge.io.formats import format_of, is_log
+from weighbridge.io import FORMATS, Takes, format_of, is_log
 
 NAMED = {"signals": {"vehicle_speed": {"column": "v", "unit": "kmh"}}, "time": {"column": "t"}}
 

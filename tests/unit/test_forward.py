@@ -9,14 +9,13 @@ from tests.noted import error
 
 import weighbridge as wb
 from weighbridge import ConfigError, DriveError, Signal
-from weighbridge.balance import ForceTable, Reason, force_balance
+from weighbridge.balance import WINDOW, ForceTable, Reason, force_balance, window_params
 from weighbridge.balance import forward as rows
-from weighbridge.balance.averaging import WINDOW, window_params
 from weighbridge.estimators.judging import STOP
 from weighbridge.kernels import window_means
 from weighbridge.navigation import forward as navigation
 from weighbridge.pipeline.forward import forward_weigh, identify_forward, lateness
-from weighbridge.signals.recent import STEP, instants, recent
+from weighbridge.signals import STEP, instants, recent
 from weighbridge.simulation import (
     MIDSIZE,
     TRUCK18,

@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from tests.noted import error, has
 
 from weighbridge import DriveError, read_drive
-from weighbridge.io.formats import format_of
+from weighbridge.io import format_of
 
 GOLDEN = Path(__file__).parents[1] / "golden"
 DAY = datetime(2026, 3, 5, 22, 15)

@@ -10,7 +10,7 @@ from tests.noted import error
 
 from weighbridge import ConfigError
 from weighbridge.constants import GRAVITY
-from weighbridge.estimators.settings import changed, parsed
+from weighbridge.estimators import changed, parsed
 from weighbridge.papers import PAPERS, galvao
 from weighbridge.papers.galvao_bounds import (
     FAST,

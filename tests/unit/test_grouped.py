@@ -7,8 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from weighbridge import DriveError, read_drive
-from weighbridge.io.formats import format_of
-from weighbridge.io.mapping_text import mapping_text
+from weighbridge.io import format_of, mapping_text
 
 ROWS = 40
 T = 0.9 * np.arange(ROWS)

@@ -7,8 +7,7 @@ from numpy.testing import assert_allclose
 from tests.noted import error, has
 
 from weighbridge import DriveError, read_drive
-from weighbridge.io.formats import format_of
-from weighbridge.io.mapping_text import mapping_text
+from weighbridge.io import format_of, mapping_text
 
 T = 0.02 * np.arange(300)
 SPEED = 60.0 + 20.0 * np.sin(T)

@@ -29,7 +29,7 @@ from weighbridge.inertia import (
     ride_samples,
 )
 from weighbridge.papers.nguyen2024 import suspension_of
-from weighbridge.simulation.ride import TRUCK, RideScenario, RideSensors, simulate_ride
+from weighbridge.simulation import TRUCK, RideScenario, RideSensors, simulate_ride
 
 SENSORS = RideSensors(rate=250.0)
 RIDE = replace(suspension_of(TRUCK, SENSORS), zero_mass=TRUCK.sprung_mass, force_std=0.01)

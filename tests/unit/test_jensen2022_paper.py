@@ -121,7 +121,7 @@ def test_seeds_are_those_that_no_tuning_saw():
 
 
 def test_what_the_paper_varies_is_a_setting():
-    from weighbridge.estimators.settings import changed
+    from weighbridge.estimators import changed
 
     made = changed(
         settings_of("jensen2022")(),

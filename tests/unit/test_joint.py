@@ -9,8 +9,7 @@ from tests.noted import refused
 
 import weighbridge as wb
 from weighbridge import Signal
-from weighbridge.balance import Reason
-from weighbridge.balance.averaging import windows
+from weighbridge.balance import Reason, windows
 from weighbridge.estimators import ESTIMATORS
 from weighbridge.estimators.joint import forward as joint_forward
 from weighbridge.estimators.joint.slow_errors import DATA_SHEET_NAMES, design, usable_rows

@@ -11,8 +11,7 @@ from numpy.testing import assert_allclose
 from tests.noted import error, has
 
 from weighbridge import DriveError, read_drive
-from weighbridge.io.formats import format_of
-from weighbridge.io.mapping_text import mapping_text
+from weighbridge.io import format_of, mapping_text
 
 T = 0.25 * np.arange(200)
 START = 1_772_732_520.0

@@ -9,10 +9,7 @@ from numpy.testing import assert_allclose
 from tests.noted import error, has, refused
 
 from weighbridge import ConfigError, DriveError, read_drive, read_frame
-from weighbridge.io.draft import Draft
-from weighbridge.io.formats import format_of
-from weighbridge.io.mapping_text import mapping_text
-from weighbridge.io.quiet import first_line
+from weighbridge.io import Draft, first_line, format_of, mapping_text
 
 HEAD = '"SECONDS";"PID";"VALUE";"UNITS";"LATITUDE";"LONGTITUDE";'
 

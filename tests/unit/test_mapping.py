@@ -6,8 +6,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 from tests.noted import error
 
 from weighbridge import ConfigError, DriveError, read_drive
+from weighbridge.io import load_mapping
 from weighbridge.io.columns import unit_suffix
-from weighbridge.io.mapping import load_mapping, mapping_for
+from weighbridge.io.mapping import mapping_for
 
 
 def write(path, content, encoding="utf-8"):

@@ -11,7 +11,7 @@ from tests.unit.test_navigation import simulate
 from weighbridge.constants import GRAVITY
 from weighbridge.navigation import find_motion, identify_motion
 from weighbridge.navigation.forward import forward_motion, lateness
-from weighbridge.signals.recent import STEP
+from weighbridge.signals import STEP
 
 
 @pytest.fixture(scope="module")

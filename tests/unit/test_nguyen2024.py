@@ -5,7 +5,7 @@ import pytest
 from tests.noted import error
 
 from weighbridge import ConfigError
-from weighbridge.estimators.settings import changed, parsed
+from weighbridge.estimators import changed, parsed
 from weighbridge.papers import nguyen2024 as paper
 
 

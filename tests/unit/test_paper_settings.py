@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 import weighbridge as wb
-from weighbridge.estimators import ESTIMATORS
-from weighbridge.estimators.settings import parsed
+from weighbridge.estimators import ESTIMATORS, parsed
 
 LEAST_SQUARES = (
     "memory=30", "forgetting=0.999", "window=0", "kept_information=0", "threshold=0.5",

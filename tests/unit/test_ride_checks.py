@@ -5,7 +5,7 @@ from tests.noted import error
 
 from weighbridge import Drive, DriveError, Problem, Signal
 from weighbridge.inertia import ride_samples
-from weighbridge.simulation.ride import RideScenario, simulate_ride
+from weighbridge.simulation import RideScenario, simulate_ride
 
 
 def test_a_clock_that_left_one_row_is_told_by_its_cause():

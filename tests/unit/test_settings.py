@@ -7,8 +7,7 @@ from tests.noted import error, has
 
 import weighbridge as wb
 from weighbridge import ConfigError
-from weighbridge.estimators import ESTIMATORS
-from weighbridge.estimators.settings import differences, parsed
+from weighbridge.estimators import ESTIMATORS, differences, parsed
 
 
 def test_settings_within_settings_are_reached_by_dots():

@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 from tests.noted import error
 
 from weighbridge import DriveError, read_drive
-from weighbridge.io.formats import format_of
+from weighbridge.io import format_of
 
 HEAD = (
     "Lap,Elapsed Time (ms),Speed (MPH),Latitude (decimal),Longitude (decimal),"

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 
-from weighbridge.balance.averaging import window_params, windows
+from weighbridge.balance import window_params, windows
 from weighbridge.kernels import window_means
 
 PARAMS = window_params(0.1, long_gap=20.0)

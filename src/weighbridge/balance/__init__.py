@@ -1,12 +1,18 @@
 """Forces against motion: where every torque source and every motion source ends."""
 
+from weighbridge.balance.averaging import PAUSE, WINDOW, Windows, window_params, windows
 from weighbridge.balance.force_balance import force_balance
 from weighbridge.balance.table import REASON_TEXT, ForceBalance, ForceTable, Reason
 
 __all__ = [
+    "PAUSE",
     "REASON_TEXT",
+    "WINDOW",
     "ForceBalance",
     "ForceTable",
     "Reason",
+    "Windows",
     "force_balance",
+    "window_params",
+    "windows",
 ]

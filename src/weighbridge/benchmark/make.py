@@ -22,7 +22,7 @@ from weighbridge.benchmark.plan import (
     plan,
 )
 from weighbridge.errors import ConfigError
-from weighbridge.io.quiet import PARSE_ERRORS, first_line
+from weighbridge.io import PARSE_ERRORS, first_line
 from weighbridge.io.write import write_drive, write_frame
 from weighbridge.signals import Drive, DriveInfo
 from weighbridge.signals.shown import plural

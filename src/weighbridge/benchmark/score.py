@@ -10,7 +10,7 @@ import polars as pl
 from weighbridge.benchmark.make import TRUTH_COLUMNS
 from weighbridge.benchmark.plan import LABELS
 from weighbridge.errors import ConfigError
-from weighbridge.io.quiet import PARSE_ERRORS, first_line
+from weighbridge.io import PARSE_ERRORS, first_line
 
 NORMAL_95: Final = 1.96
 """Half of the interval of 95 % of a normal distribution, in standard deviations [-]."""

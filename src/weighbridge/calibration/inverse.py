@@ -14,8 +14,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from scipy.linalg import block_diag
 
-from weighbridge.balance import law
-from weighbridge.balance.averaging import WINDOW, Windows, windows
+from weighbridge.balance import WINDOW, Windows, law, windows
 from weighbridge.balance.law import DISTURBANCE_STD
 from weighbridge.balance.table import ForceTable
 from weighbridge.constants import GRAVITY

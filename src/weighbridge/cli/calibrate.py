@@ -146,7 +146,7 @@ def calibrate(
     """
     from weighbridge.arguments import check_choice
     from weighbridge.calibration import CalibrationSettings, TrainingSettings, with_findings
-    from weighbridge.estimators.settings import changed, parsed
+    from weighbridge.estimators import changed, parsed
     from weighbridge.pipeline.given import dbcs_beside, mapping_beside
     from weighbridge.vehicle import TORQUE_SOURCES, Vehicle
 

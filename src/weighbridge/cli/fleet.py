@@ -162,7 +162,7 @@ def run(
 
     Example: weighbridge fleet 'drives/**' --vehicles vehicles/ -o results/
     """
-    from weighbridge.estimators.settings import parsed
+    from weighbridge.estimators import parsed
     from weighbridge.fleet.bucket import place_of_results
     from weighbridge.fleet.run import FleetSettings, run_fleet
 

@@ -63,7 +63,7 @@ def inertia(
 
     Example: weighbridge inertia ride/ --vehicle truck.toml --report ride.html
     """
-    from weighbridge.estimators.settings import parsed
+    from weighbridge.estimators import parsed
     from weighbridge.pipeline.inertia import estimate_inertia
     from weighbridge.vehicle import Vehicle
 

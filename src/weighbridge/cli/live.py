@@ -326,7 +326,7 @@ def _unwatched(replay: Path | None, speed: float) -> bool:
 
 def _step(replay: Path | None, speed: float) -> float:
     """Choose the step of the scale [s]."""
-    from weighbridge.signals.recent import LONGEST_STEP, STEP
+    from weighbridge.signals import LONGEST_STEP, STEP
 
     return LONGEST_STEP if _unwatched(replay, speed) else STEP
 

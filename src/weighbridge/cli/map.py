@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 
     from rich.console import Console
 
+    from weighbridge.io import Draft
     from weighbridge.io.dbc import Database
-    from weighbridge.io.draft import Draft
 
 _NO_TORQUE = (
     "  no column taken is a torque, a load or a power, without which nothing can be weighed. "
@@ -90,8 +90,8 @@ def map_log(
     Example: weighbridge map trip.csv -o map.toml
     """
     from weighbridge.errors import DriveError
+    from weighbridge.io import mapping_text
     from weighbridge.io.drafts import kinds, with_compared_speeds
-    from weighbridge.io.mapping_text import mapping_text
     from weighbridge.whole import whole_file
 
     if output is not None:
@@ -210,8 +210,8 @@ def _files(
 ) -> list[tuple[Path, Callable[[Path], Draft]]]:
     """Files named, those of folders included, each with what drafts its mapping."""
     from weighbridge.errors import DriveError
-    from weighbridge.io.dbc import load_dbcs
-    from weighbridge.io.formats import format_of, formats, is_log, unreadable
+    from weighbridge.io import format_of, formats, is_log, load_dbcs
+    from weighbridge.io.formats import unreadable
     from weighbridge.io.paths import partitions
 
     databases = load_dbcs(list(dbc))
@@ -262,9 +262,8 @@ def _draft(
     The DBC of a folder may be that of other files ``beside`` it: without frames it is not asked.
     """
     from weighbridge.errors import DriveError
-    from weighbridge.io import draft as tables
-    from weighbridge.io.bus_draft import NoFramesError, draft_bus
-    from weighbridge.io.formats import format_of
+    from weighbridge.io import draft, draft_bus, format_of
+    from weighbridge.io.bus_draft import NoFramesError
 
     try:
         form = format_of(path)
@@ -284,10 +283,10 @@ def _draft(
                 return channels(log)
 
         return by_frames
-    if names and form.draft is not tables.draft:
+    if names and form.draft is not draft:
         raise DriveError(f"{path} names what it holds itself; leave out --columns")
     if names:
-        return lambda log: tables.draft(log, names)
+        return lambda log: draft(log, names)
     return form.draft
 
 

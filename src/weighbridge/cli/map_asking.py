@@ -13,7 +13,7 @@ from weighbridge.cli.terminal import complain, shown
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from weighbridge.io.draft import Draft
+    from weighbridge.io import Draft
     from weighbridge.io.draft_column import DraftColumn
     from weighbridge.io.draft_time import DraftTime
 

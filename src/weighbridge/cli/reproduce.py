@@ -71,7 +71,7 @@ def reproduce(
     """
     from weighbridge import papers
     from weighbridge.arguments import check_choice
-    from weighbridge.estimators.settings import differences
+    from weighbridge.estimators import differences
 
     check_choice("paper", paper, (*papers.PAPERS, "all"))
     names = list(papers.PAPERS) if paper == "all" else [paper]
@@ -121,7 +121,7 @@ def _settings(paper: str, changes: list[str]) -> Any:
     """Settings of a paper's reproduction; None where nothing was asked for."""
     from weighbridge import papers
     from weighbridge.errors import ConfigError
-    from weighbridge.estimators.settings import changed, parsed
+    from weighbridge.estimators import changed, parsed
 
     if not changes:
         return None

@@ -124,7 +124,8 @@ def inputs(
 
 def _dbcs_of(mapping: Path | None) -> tuple[str, ...]:
     """DBC files that a mapping names; none where it cannot be used, which its reader says."""
-    from weighbridge.io.mapping import load_mapping, named_dbcs
+    from weighbridge.io import load_mapping
+    from weighbridge.io.mapping import named_dbcs
 
     try:
         return named_dbcs(load_mapping(mapping)) if mapping is not None else ()
@@ -265,7 +266,7 @@ def refuse_missing_folder(*outputs: Path | None) -> None:
 
 def _refuse_new_table(read: Inputs, path: Path, target: Path) -> None:
     """Raise where a result would be read as a table of a drive from then on."""
-    from weighbridge.io.formats import is_log
+    from weighbridge.io import is_log
     from weighbridge.signals.catalogue import TABLES
 
     if not is_log(target):
@@ -301,7 +302,7 @@ def _place(path: Path) -> tuple[int, int] | None:
 
 
 def _may_be_read(path: Path) -> bool:
-    from weighbridge.io.formats import is_log
+    from weighbridge.io import is_log
 
     return path.suffix.lower() == ".toml" or is_log(path)
 
@@ -324,7 +325,7 @@ def _has_track(path: Path) -> bool:
     """Say whether an MF4 holds a track; not where it is damaged."""
     from asammdf import MDF
 
-    from weighbridge.io.quiet import quietly
+    from weighbridge.io import quietly
 
     try:
         with quietly(), MDF(path) as file:
@@ -338,7 +339,7 @@ def _columns(path: Path) -> bytes:
     """Names of the columns of a Parquet file; none where it is damaged."""
     import polars as pl
 
-    from weighbridge.io.quiet import PARSE_ERRORS, quietly
+    from weighbridge.io import PARSE_ERRORS, quietly
 
     try:
         with path.open("rb") as file, quietly():

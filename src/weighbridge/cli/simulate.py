@@ -178,7 +178,7 @@ def _simulate_ride(
     """Simulate and write the ride of a two-axle truck on a rough road."""
     from weighbridge.errors import ConfigError
     from weighbridge.signals.units import scalar_to_si
-    from weighbridge.simulation.ride import TRUCK, RideScenario, simulate_ride
+    from weighbridge.simulation import TRUCK, RideScenario, simulate_ride
 
     sprung = TRUCK.sprung_mass if mass is None else mass - sum(TRUCK.unsprung_mass)
     if not sprung > 0.0:

@@ -124,7 +124,7 @@ def weigh(
     Example: weighbridge weigh drive-1/ drive-2/ --vehicle car.toml --report weighed.html
     """
     from weighbridge.errors import ConfigError
-    from weighbridge.estimators.settings import parsed
+    from weighbridge.estimators import parsed
     from weighbridge.results.plotjuggler import layout_of
     from weighbridge.vehicle import Vehicle
 

@@ -19,7 +19,7 @@ from weighbridge.estimators import (
     speed_torque_ekf,
     vahidi,
 )
-from weighbridge.estimators.settings import changed
+from weighbridge.estimators.settings import changed, differences, parsed
 from weighbridge.estimators.track import MassTrack, Segment, Status
 from weighbridge.registry import Registry
 from weighbridge.signals import Drive
@@ -165,4 +165,13 @@ ESTIMATORS: Final = Registry(
 )
 """Every method of `weighbridge weigh`, in the order to show them."""
 
-__all__ = ["ESTIMATORS", "Estimator", "MassTrack", "Segment", "Status"]
+__all__ = [
+    "ESTIMATORS",
+    "Estimator",
+    "MassTrack",
+    "Segment",
+    "Status",
+    "changed",
+    "differences",
+    "parsed",
+]

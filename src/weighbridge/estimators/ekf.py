@@ -8,8 +8,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from weighbridge.balance import ForceBalance, Reason
-from weighbridge.balance.averaging import PAUSE
+from weighbridge.balance import PAUSE, ForceBalance, Reason
 from weighbridge.balance.instants import SLOWEST_GEARED
 from weighbridge.balance.law import drag_factor, mass_column, ratio_force, rotating_mass
 from weighbridge.constants import GRAVITY

@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
-from weighbridge.balance import ForceBalance, Reason
-from weighbridge.balance.averaging import windows
+from weighbridge.balance import ForceBalance, Reason, windows
 from weighbridge.balance.table import ForceTable
 from weighbridge.estimators.gate import GATE, GateSettings
 from weighbridge.estimators.track import MassTrack, Segment, Status

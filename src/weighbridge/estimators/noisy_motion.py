@@ -6,7 +6,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from weighbridge.balance.averaging import Windows
+from weighbridge.balance import Windows
 from weighbridge.balance.table import ForceBalance, ForceTable
 from weighbridge.estimators.joint.slow_errors import MOTION_WINDOW_STD, motion_variance
 from weighbridge.estimators.regression import regression

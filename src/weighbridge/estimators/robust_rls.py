@@ -9,8 +9,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from weighbridge.balance import ForceBalance, Reason
-from weighbridge.balance.averaging import PAUSE
+from weighbridge.balance import PAUSE, ForceBalance, Reason
 from weighbridge.balance.cornering import yaw_rate
 from weighbridge.balance.table import ForceTable
 from weighbridge.constants import GRAVITY

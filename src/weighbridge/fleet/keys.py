@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Final
 
-from weighbridge.io.formats import is_log
+from weighbridge.io import is_log
 from weighbridge.io.parts import SUFFIX as PARTS
 from weighbridge.io.read import TRUTH_NAME
 from weighbridge.signals.catalogue import TABLES

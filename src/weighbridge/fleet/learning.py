@@ -21,7 +21,7 @@ from weighbridge.fleet.remote import by_url
 from weighbridge.fleet.scales import Weighed, find_scales
 from weighbridge.fleet.tickets import read_tickets, ticketed, with_tickets
 from weighbridge.fleet.vehicles import Assigned, Vehicles
-from weighbridge.io.quiet import PARSE_ERRORS, quietly
+from weighbridge.io import PARSE_ERRORS, quietly
 from weighbridge.messages import Problem
 from weighbridge.pipeline.given import mapping_beside
 from weighbridge.signals import Drive, Floats

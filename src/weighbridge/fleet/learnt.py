@@ -8,7 +8,7 @@ from typing import Any, Final
 import polars as pl
 
 from weighbridge.errors import ConfigError
-from weighbridge.io.quiet import PARSE_ERRORS, first_line, quietly
+from weighbridge.io import PARSE_ERRORS, first_line, quietly
 
 LEARNT: Final = "learnt.parquet"
 """Its file, in the folder of the results."""

@@ -8,7 +8,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Final
 
-from weighbridge.io.formats import is_log
+from weighbridge.io import is_log
 from weighbridge.io.info import FILE_NAME as INFO_NAME
 from weighbridge.io.parts import SUFFIX as PARTS
 from weighbridge.io.read import TRUTH_NAME

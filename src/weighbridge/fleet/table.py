@@ -11,7 +11,7 @@ import polars as pl
 
 from weighbridge.errors import DriveError
 from weighbridge.fleet.remote import is_url
-from weighbridge.io.quiet import PARSE_ERRORS, first_line, quietly
+from weighbridge.io import PARSE_ERRORS, first_line, quietly
 
 FILES: Final = "files"
 """Column that makes a table one of drives."""

@@ -10,7 +10,7 @@ from typing import Any, Final, NamedTuple
 import polars as pl
 
 from weighbridge.errors import ConfigError
-from weighbridge.io.quiet import PARSE_ERRORS, first_line, quietly
+from weighbridge.io import PARSE_ERRORS, first_line, quietly
 
 COLUMNS: Final = ("vehicle", "time", "mass_kg")
 """Columns of a table of tickets: id of the vehicle, date and time (UTC where it names no zone), and

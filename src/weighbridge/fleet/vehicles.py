@@ -11,8 +11,9 @@ from typing import Any, Final, NamedTuple
 from weighbridge.arguments import check_choice
 from weighbridge.errors import ConfigError
 from weighbridge.fleet.keys import file_digest, text_digest
+from weighbridge.io import load_mapping
 from weighbridge.io.dbc import dbc_path, with_path
-from weighbridge.io.mapping import load_mapping, named_dbcs
+from weighbridge.io.mapping import named_dbcs
 from weighbridge.io.naming import words_of
 from weighbridge.io.paths import partitions
 from weighbridge.messages import Problem, phrase

@@ -10,9 +10,8 @@ from typing import Final
 
 from weighbridge.errors import ConfigError, WeighbridgeError
 from weighbridge.live.scale import LiveScale
-from weighbridge.signals import DriveInfo
+from weighbridge.signals import STEP, DriveInfo
 from weighbridge.signals.instants import instant
-from weighbridge.signals.recent import STEP
 from weighbridge.vehicle import Vehicle
 from weighbridge.whole import write_whole
 

@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from weighbridge.balance.averaging import WINDOW
+from weighbridge.balance import WINDOW
 from weighbridge.balance.table import MOVING
 from weighbridge.estimators.joint import JointSettings
 from weighbridge.estimators.joint.possible import enough_windows

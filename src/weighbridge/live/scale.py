@@ -32,15 +32,8 @@ from weighbridge.navigation.forward import forward_axis
 from weighbridge.pipeline import forward
 from weighbridge.pipeline.forward import ForwardSetup, ForwardState
 from weighbridge.pipeline.given import GivenVehicle, as_vehicle
-from weighbridge.signals import Drive, DriveInfo, Floats
-from weighbridge.signals.recent import (
-    BEHIND,
-    FEWEST_SAMPLES,
-    STEP,
-    first_instant,
-    last_instant,
-    recent,
-)
+from weighbridge.signals import BEHIND, STEP, Drive, DriveInfo, Floats, recent
+from weighbridge.signals.recent import FEWEST_SAMPLES, first_instant, last_instant
 
 _LOG = logging.getLogger(__name__)
 

@@ -52,9 +52,8 @@ from weighbridge.navigation.rows import (
 )
 from weighbridge.navigation.sources import Sources, undelayed
 from weighbridge.navigation.state import State
-from weighbridge.signals import Bools, Drive, Floats, Signal
+from weighbridge.signals import BEHIND, Bools, Drive, Floats, Signal, instants, recent
 from weighbridge.signals.catalogue import IMU_SIGNALS
-from weighbridge.signals.recent import BEHIND, instants, recent
 
 LAID_OUT: Final = 0.25
 """A row is laid out so long after its instant [s]: half of `SQUAT_WIDTH` and a node."""

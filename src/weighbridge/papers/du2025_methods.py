@@ -9,8 +9,7 @@ from functools import partial
 from typing import Final, TypeVar
 
 from weighbridge.balance import ForceBalance
-from weighbridge.estimators import MassTrack, ekf, hybrid, robust_rls
-from weighbridge.estimators.settings import changed, parsed
+from weighbridge.estimators import MassTrack, changed, ekf, hybrid, parsed, robust_rls
 from weighbridge.report.style import BLUE, GREEN, ORANGE
 from weighbridge.vehicle import Vehicle
 

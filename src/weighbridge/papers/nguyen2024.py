@@ -76,13 +76,7 @@ from weighbridge.papers.nguyen2024_judged import suspension_of as suspension_of
 from weighbridge.papers.reproduced import Progress, Reproduced
 from weighbridge.report.table import Table
 from weighbridge.signals import Floats
-from weighbridge.simulation.ride import (
-    TRUCK,
-    RideScenario,
-    RideSensors,
-    SimulatedRide,
-    simulate_ride,
-)
+from weighbridge.simulation import TRUCK, RideScenario, RideSensors, SimulatedRide, simulate_ride
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -7,7 +7,7 @@ from typing import Final
 
 from weighbridge.errors import ConfigError
 from weighbridge.inertia import InertiaSettings, Method
-from weighbridge.simulation.ride import RideSensors
+from weighbridge.simulation import RideSensors
 from weighbridge.vehicle.possible import positive
 
 CHANGES: Final = ((7.0, 1.5), (14.0, 0.5))

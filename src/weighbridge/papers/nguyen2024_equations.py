@@ -17,7 +17,7 @@ from weighbridge.papers.claims import Found, same
 from weighbridge.papers.nguyen2024_cases import AS_PRINTED, PAPERS_SENSORS, Settings
 from weighbridge.papers.nguyen2024_judged import judge, suspension_of
 from weighbridge.signals import Floats
-from weighbridge.simulation.ride import TRUCK, system
+from weighbridge.simulation import TRUCK, system
 
 MASS, ROLL, PITCH = 5394.0, 4600.0, 19632.0
 FRONT, REAR = 2.400, 1.685

@@ -8,7 +8,7 @@ import numpy as np
 
 from weighbridge.inertia import InertiaTrack
 from weighbridge.signals import Floats
-from weighbridge.simulation.ride import RideSensors, RideVehicle, SimulatedRide
+from weighbridge.simulation import RideSensors, RideVehicle, SimulatedRide
 from weighbridge.vehicle import Ride
 
 

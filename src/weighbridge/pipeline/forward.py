@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from weighbridge.arguments import check_number
+from weighbridge.balance import WINDOW, window_params
 from weighbridge.balance import forward as force_rows
-from weighbridge.balance.averaging import WINDOW, window_params
 from weighbridge.balance.force_balance import ForceState
 from weighbridge.balance.instants import REACH
 from weighbridge.balance.law import accessory_column
@@ -36,8 +36,7 @@ from weighbridge.kernels import window_means
 from weighbridge.kernels.ins_model import E_SQUAT, SQUAT
 from weighbridge.navigation import forward
 from weighbridge.navigation.select import scaled_for_navigation
-from weighbridge.signals import Drive, Floats
-from weighbridge.signals.recent import STEP, STEPS, instants, recent
+from weighbridge.signals import STEP, STEPS, Drive, Floats, instants, recent
 from weighbridge.vehicle import Vehicle
 from weighbridge.vehicle.torque import reading_battery
 

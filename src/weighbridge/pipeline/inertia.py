@@ -15,7 +15,7 @@ from weighbridge.arguments import check_path, check_text, check_type, suggestion
 from weighbridge.checks import correct_drive, refuse_serious
 from weighbridge.constants import GRAVITY
 from weighbridge.errors import ConfigError
-from weighbridge.estimators.settings import changed, differences
+from weighbridge.estimators import changed, differences
 from weighbridge.estimators.track import Status
 from weighbridge.inertia import (
     AXES,

@@ -27,7 +27,7 @@ from weighbridge.balance.shaking import shaken
 from weighbridge.balance.speed_balance import speed_balance
 from weighbridge.balance.torque_drift import smoothed_steps
 from weighbridge.errors import ConfigError, DriveError, WeighbridgeError
-from weighbridge.estimators import ESTIMATORS, MassTrack, Status, joint
+from weighbridge.estimators import ESTIMATORS, MassTrack, Status, differences, joint
 from weighbridge.estimators.gate import GATE
 from weighbridge.estimators.joint.bend import bent
 from weighbridge.estimators.joint.changing import largest
@@ -35,7 +35,6 @@ from weighbridge.estimators.joint.contradicted import contradicted
 from weighbridge.estimators.joint.foreign import of_another
 from weighbridge.estimators.joint.slow_errors import motion_variance, with_variance
 from weighbridge.estimators.judging import lacks_accelerometer
-from weighbridge.estimators.settings import differences
 from weighbridge.estimators.squat import of_vehicle
 from weighbridge.messages import Problem, phrase, refused
 from weighbridge.navigation import BY_SPEED, Motion, identify_motion, without_accelerometer

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from weighbridge.balance import Reason
-from weighbridge.balance.averaging import windows
+from weighbridge.balance import Reason, windows
 from weighbridge.balance.table import ForceTable
 from weighbridge.estimators import MassTrack
 from weighbridge.report.style import (

@@ -3,10 +3,15 @@
 from weighbridge.messages import Problem
 from weighbridge.signals.catalogue import QUANTITIES, Quantity
 from weighbridge.signals.drive import Drive, DriveInfo
+from weighbridge.signals.recent import BEHIND, LONGEST_STEP, STEP, STEPS, instants, recent
 from weighbridge.signals.signal import Bools, Floats, Ints, Signal
 
 __all__ = [
+    "BEHIND",
+    "LONGEST_STEP",
     "QUANTITIES",
+    "STEP",
+    "STEPS",
     "Bools",
     "Drive",
     "DriveInfo",
@@ -15,4 +20,6 @@ __all__ = [
     "Problem",
     "Quantity",
     "Signal",
+    "instants",
+    "recent",
 ]

@@ -3,6 +3,15 @@
 from weighbridge.simulation.car import COMPACT, ELECTRIC, MIDSIZE, SimulatedCar, random_car
 from weighbridge.simulation.fleet import FleetSettings, plan_fleet
 from weighbridge.simulation.named import ABOUT, SCENARIOS, make_scenario, usual_polling
+from weighbridge.simulation.ride import (
+    TRUCK,
+    RideScenario,
+    RideSensors,
+    RideVehicle,
+    SimulatedRide,
+    simulate_ride,
+    system,
+)
 from weighbridge.simulation.route import (
     Route,
     bus_route,
@@ -44,6 +53,7 @@ __all__ = [
     "ELECTRIC",
     "MIDSIZE",
     "SCENARIOS",
+    "TRUCK",
     "TRUCK18",
     "VAN",
     "Braking",
@@ -52,11 +62,15 @@ __all__ = [
     "Habits",
     "Loading",
     "Polling",
+    "RideScenario",
+    "RideSensors",
+    "RideVehicle",
     "Route",
     "Scenario",
     "Sensors",
     "SimulatedCar",
     "SimulatedDrive",
+    "SimulatedRide",
     "Trailer",
     "Truth",
     "VehicleKind",
@@ -74,7 +88,9 @@ __all__ = [
     "random_vehicle",
     "short_route",
     "simulate_car",
+    "simulate_ride",
     "straight_route",
+    "system",
     "usual_polling",
     "with_random_details",
 ]

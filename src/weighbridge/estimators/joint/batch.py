@@ -9,8 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from weighbridge.balance import ForceBalance, Reason
-from weighbridge.balance.averaging import Windows, windows
+from weighbridge.balance import ForceBalance, Reason, Windows, windows
 from weighbridge.balance.force_balance import highest_torque
 from weighbridge.balance.law import accessory_column, traction_gain
 from weighbridge.balance.table import ForceTable

@@ -7,8 +7,7 @@ from typing import Final, TypeVar
 
 import numpy as np
 
-from weighbridge.balance import law
-from weighbridge.balance.averaging import WINDOW, Windows
+from weighbridge.balance import WINDOW, Windows, law
 from weighbridge.balance.law import DISTURBANCE_STD
 from weighbridge.balance.table import ForceTable
 from weighbridge.constants import GRAVITY
