@@ -94,9 +94,6 @@ def test_a_log_that_broke_off_is_read_to_there(tmp_path, pack):
 
 @pytest.mark.parametrize("package", ["capnp", "zstandard"])
 def test_missing_package_names_the_extra(tmp_path, monkeypatch, package):
-    from weighbridge.io import openpilot
-
-    openpilot._schema.cache_clear()
     (tmp_path / "rlog.zst").write_bytes(zstandard.ZstdCompressor().compress(PLAIN))
     monkeypatch.setitem(__import__("sys").modules, package, None)
     with pytest.raises(MissingExtraError, match=r"weighbridge\[openpilot\]"):

@@ -7,8 +7,7 @@ import pytest
 
 from tests.noted import error
 from weighbridge import ConfigError
-from weighbridge.live import OrderFile
-from weighbridge.live.orders import orders
+from weighbridge.live import OrderFile, order_file
 
 needs_pipes = pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="there are no named pipes")
 
@@ -21,7 +20,7 @@ def written(path, text):
 @needs_pipes
 def test_a_pipe_is_made_and_taken_away(tmp_path):
     path = tmp_path / "orders"
-    with orders(path) as file:
+    with order_file(path) as file:
         assert stat.S_ISFIFO(path.stat().st_mode)
         assert stat.S_IMODE(path.stat().st_mode) == 0o600
         assert file.read() == []
@@ -37,7 +36,7 @@ def test_a_pipe_is_made_and_taken_away(tmp_path):
 def test_a_pipe_that_was_there_stays(tmp_path):
     path = tmp_path / "orders"
     os.mkfifo(path)
-    with orders(path):
+    with order_file(path):
         pass
     assert path.exists()
 
@@ -45,7 +44,7 @@ def test_a_pipe_that_was_there_stays(tmp_path):
 def test_of_a_file_only_what_is_appended_is_done(tmp_path):
     path = tmp_path / "orders"
     path.write_text("end\n")
-    with orders(path) as file:
+    with order_file(path) as file:
         assert file.read() == []
         written(path, "load\n")
         assert file.read() == ["load"]
@@ -58,7 +57,7 @@ def test_of_a_file_only_what_is_appended_is_done(tmp_path):
 @needs_pipes
 def test_noise_without_end_is_no_order_and_does_not_grow(tmp_path):
     path = tmp_path / "orders"
-    with orders(path) as file:
+    with order_file(path) as file:
         for _ in range(50):
             written(path, "\xff\x00" * 1000)
             assert file.read() == []
@@ -68,7 +67,7 @@ def test_noise_without_end_is_no_order_and_does_not_grow(tmp_path):
 
 
 def test_without_a_path_there_are_none():
-    with orders(None) as file:
+    with order_file(None) as file:
         assert file is None
 
 

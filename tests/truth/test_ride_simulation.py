@@ -10,8 +10,10 @@ from scipy.signal import csd, welch
 
 from weighbridge import ConfigError
 from weighbridge.simulation import TRUCK, RideScenario, RideSensors, simulate_ride
-from weighbridge.simulation.ride import SETTLING
 from weighbridge.simulation.ride_road import BAND, ROUGHNESS, coherence, draw_road
+
+SETTLING = 6.0
+"""The road begins so long before the first sample [s]."""
 
 QUIET = RideSensors(rate=500.0, travel_noise=0.0, rate_noise=0.0, body_noise=(0.0, 0.0, 0.0))
 

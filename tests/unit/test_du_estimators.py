@@ -12,8 +12,6 @@ from weighbridge import ConfigError, Status, Vehicle
 from weighbridge.balance import ForceBalance, ForceTable, Reason
 from weighbridge.constants import GRAVITY
 from weighbridge.estimators import ESTIMATORS
-from weighbridge.estimators import ekf as ekf_rows
-from weighbridge.estimators import robust_rls as robust_rows
 from weighbridge.kernels import mass_ekf as kernel
 from weighbridge.vehicle import Driveline, Provenance, RoadLoad, TorqueModel
 
@@ -181,12 +179,44 @@ def test_the_noise_of_the_motion_that_is_known_does_not_draw_the_final_mass_down
 
 def filtered(made, settings):
     """Errors of the Kalman filter's running mass over the standard deviation it has itself."""
-    _, _, valid = robust_rows.rows(made.table, BUS, settings.start)
-    rows = ekf_rows.columns(made, BUS, valid, settings)
-    params = ekf_rows.parameters(settings, BUS, robust_rows.row_period(made.table.time))
+    table, road = made.table, BUS.road_load
+    rolling = road.rolling_coefficient + road.rolling_speed_coefficient * table.speed
+    phi = table.specific_force + GRAVITY * rolling * np.cos(table.grade)
+    mean = np.ones(1 + round(settings.jacobian_window / 0.1))
+    rows = kernel.Columns(
+        time=table.time,
+        traction=table.traction_force,
+        drag=0.5 * table.air_density * road.drag_area,
+        headwind=np.zeros(table.time.size),
+        rotating=np.full(table.time.size, 300.0),
+        speed=table.speed,
+        grade=table.grade,
+        driven=table.usable,
+        standing=table.speed < 1.0,
+        regressor=np.convolve(phi, mean / mean.size, mode="same"),
+    )
+    params = kernel.MassEkfParams(
+        gravity=GRAVITY,
+        rolling=road.rolling_coefficient,
+        rolling_speed=road.rolling_speed_coefficient,
+        speed_density=settings.speed_noise**2,
+        grade_density=settings.grade_noise**2,
+        accel_walk=settings.accel_walk**2,
+        grade_walk=settings.grade_walk**2,
+        mass_walk=(settings.mass_walk * BUS.tare) ** 2,
+        load_walk=(settings.load_walk * BUS.tare) ** 2,
+        start_speed_var=settings.start_speed_std**2,
+        start_grade_var=settings.start_grade_std**2,
+        offset_var=settings.grade_offset**2,
+        offset_walk=settings.offset_walk**2,
+        gate=settings.gate,
+        pause=0.8,
+        lightest=5000.0,
+        heaviest=20_000.0,
+    )
     start = kernel.initial_state(10_000.0, 1000.0**2, kernel.row_at(rows, 0), params)
     _, mass, var, *_ = kernel.run(start, rows, 0, params)
-    return ((mass - 10_000.0) / np.sqrt(var))[made.table.time > 60.0]
+    return ((mass - 10_000.0) / np.sqrt(var))[table.time > 60.0]
 
 
 def test_the_kalman_filter_is_as_sure_as_torque_errors_that_last_allow():

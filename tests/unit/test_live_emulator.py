@@ -16,8 +16,7 @@ from weighbridge import ConfigError, Drive, DriveError, Signal
 from weighbridge.errors import SourceError
 from weighbridge.io.nmea import read_sentence
 from weighbridge.io.obd import LENGTHS, PIDS, bytes_of, parameters_of, values_of
-from weighbridge.live import Feed, clock, parse_source
-from weighbridge.live.emulator import Played, devices
+from weighbridge.live import Feed, Played, clock, devices, parse_source
 from weighbridge.live.emulator.lines import InertialLines
 from weighbridge.live.emulator.sentences import Sentences
 from weighbridge.live.sources.elm_text import read_reply

@@ -8,7 +8,6 @@ from tests.noted import error
 from weighbridge import ConfigError, DriveError, read_drive
 from weighbridge.io import load_mapping
 from weighbridge.io.columns import unit_suffix
-from weighbridge.io.mapping import mapping_for
 
 
 def write(path, content, encoding="utf-8"):
@@ -165,15 +164,18 @@ def test_several_kinds_of_file_in_one_folder(tmp_path):
 
 
 def test_first_pattern_that_fits_is_taken(tmp_path):
-    mappings = load_mapping(
-        {
-            "tables": {"imu": {"signals": SPEED}},
-            "signals": SPEED,
-        }
-    )
-    assert [m.files for m in mappings] == ["imu.*", "*"]
-    assert mapping_for(tmp_path / "IMU.csv", mappings) is mappings[0]
-    assert mapping_for(tmp_path / "obd.csv", mappings) is mappings[1]
+    accel = {"accel_x": {"column": "x", "unit": "mps2"}}
+    mapping = {
+        "tables": {"imu": {"time": {"column": "t"}, "signals": accel}},
+        "time": {"column": "t"},
+        "signals": SPEED,
+    }
+    assert [m.files for m in load_mapping(mapping)] == ["imu.*", "*"]
+    write(tmp_path / "IMU.csv", "t,x,v\n0,1,1\n1,2,2\n")
+    write(tmp_path / "obd.csv", "t,x,v\n0,3,36\n1,4,72\n")
+    drive = read_drive(tmp_path, mapping)
+    assert_array_equal(drive.signals["accel_x"].values, [1.0, 2.0])
+    assert_allclose(drive.signals["vehicle_speed"].values, [10.0, 20.0])
 
 
 def test_wrong_separator_is_told_with_the_right_one(tmp_path):

@@ -13,7 +13,7 @@ from weighbridge.cli.terminal import console, say
 from weighbridge.cli.verbosity import notice, watched
 
 if TYPE_CHECKING:
-    from weighbridge.live.emulator import Played
+    from weighbridge.live import Played
 
 _GLANCE: Final = 0.2
 _WITHOUT: Final = {
@@ -53,7 +53,7 @@ def emulate(
 
     Example: weighbridge emulate drive/ --rate 5
     """
-    from weighbridge.live.emulator import Played, devices
+    from weighbridge.live import Played, devices
 
     played = Played(load(drive, mapping, dbc), rate)
     stop = Event()

@@ -186,10 +186,9 @@ def live(
     import logging
 
     from weighbridge.errors import ConfigError
-    from weighbridge.live import Feed, Outputs, Session
+    from weighbridge.live import Feed, Outputs, Session, order_file
     from weighbridge.live.clock import at_rate
     from weighbridge.live.keys import keys
-    from weighbridge.live.orders import orders as order_file
     from weighbridge.vehicle import Vehicle
 
     _refuse_options(source, replay, every, ticket, out)

@@ -95,9 +95,7 @@ class _Held:
 
 
 @lru_cache(maxsize=1)
-def _schema() -> Any:
-    import capnp
-
+def _schema(capnp: Any) -> Any:
     capnp.remove_import_hook()
     return capnp.load(str(Path(__file__).with_name("openpilot.capnp")))
 
@@ -113,7 +111,9 @@ def open_openpilot(path: Path, time: TimeColumn) -> Recording:
         pycapnp, or for a ``.zst`` zstandard, is not installed.
     """
     with importing("pycapnp", "openpilot", f"reading {path.name}"):
-        event = _schema().Event
+        import capnp
+
+        event = _schema(capnp).Event
     data, reason = _unpacked(path)
     held = _Held()
     count = strange = 0

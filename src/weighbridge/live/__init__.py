@@ -9,9 +9,10 @@ from weighbridge.first_use import at_first_use
 if TYPE_CHECKING:
     from weighbridge.live.alerts import Alert
     from weighbridge.live.arrival import Arrivals, Need, needs
+    from weighbridge.live.emulator import Played, devices
     from weighbridge.live.feed import Feed
     from weighbridge.live.keeper import Keeper
-    from weighbridge.live.orders import OrderFile
+    from weighbridge.live.orders import OrderFile, order_file
     from weighbridge.live.outputs import Output, Outputs
     from weighbridge.live.outputs.lines import Lines
     from weighbridge.live.outputs.mqtt import Mqtt, parse_broker
@@ -41,13 +42,16 @@ _HOMES = {
     "Output": "weighbridge.live.outputs",
     "Outputs": "weighbridge.live.outputs",
     "Page": "weighbridge.live.outputs.page",
+    "Played": "weighbridge.live.emulator",
     "Recorder": "weighbridge.live.recorder",
     "Recordings": "weighbridge.live.recordings",
     "Replay": "weighbridge.live.replay",
     "Session": "weighbridge.live.session",
     "Source": "weighbridge.live.source",
+    "devices": "weighbridge.live.emulator",
     "needs": "weighbridge.live.arrival",
     "order": "weighbridge.live.session",
+    "order_file": "weighbridge.live.orders",
     "parse_broker": "weighbridge.live.outputs.mqtt",
     "parse_source": "weighbridge.live.sources",
 }
@@ -68,13 +72,16 @@ __all__ = [
     "Output",
     "Outputs",
     "Page",
+    "Played",
     "Recorder",
     "Recordings",
     "Replay",
     "Session",
     "Source",
+    "devices",
     "needs",
     "order",
+    "order_file",
     "parse_broker",
     "parse_source",
 ]

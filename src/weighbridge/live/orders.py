@@ -94,7 +94,7 @@ class OrderFile:
 
 
 @contextlib.contextmanager
-def orders(path: Path | None) -> Iterator[OrderFile | None]:
+def order_file(path: Path | None) -> Iterator[OrderFile | None]:
     """Open the file of orders for a while; None for none."""
     if path is None:
         yield None
