@@ -23,8 +23,7 @@ from weighbridge.papers import du2025 as paper
 from weighbridge.papers import du2025_bus
 from weighbridge.papers.du2025_methods import FORMS, METHODS, PAPER_RMSE, PRINTED, Settings
 from weighbridge.report.table import Table
-from weighbridge.signals import Floats
-from weighbridge.signals.units import scalar_to_si
+from weighbridge.signals import Floats, scalar_to_si
 from weighbridge.simulation import make_scenario, simulate_car
 from weighbridge.vehicle.model import Vehicle
 

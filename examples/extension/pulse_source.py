@@ -7,7 +7,7 @@ from weighbridge.live.device_clock import DeviceClock
 from weighbridge.live.sources.gathered import BLOCK, Gathered
 from weighbridge.live.sources.kind import SourceKind
 from weighbridge.live.sources.links import serial_or_tcp
-from weighbridge.signals.units import scalar_to_si
+from weighbridge.signals import scalar_to_si
 
 BAUD = 115_200
 SILENT = 5.0  # [s]

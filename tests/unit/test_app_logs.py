@@ -8,8 +8,7 @@ import pytest
 
 from weighbridge import read_drive
 from weighbridge.io import draft, mapping_text
-from weighbridge.signals import QUANTITIES
-from weighbridge.signals.units import to_si
+from weighbridge.signals import QUANTITIES, to_si
 
 FOLDER = Path(__file__).parent
 HEADERS = tomllib.loads((FOLDER / "logger_headers.toml").read_text("utf-8"))

@@ -11,7 +11,7 @@ from tests.noted import error
 import weighbridge as wb
 from weighbridge import CalibrationSettings, ConfigError
 from weighbridge.papers.nguyen2024 import suspension_of
-from weighbridge.signals.units import unit
+from weighbridge.signals import unit
 from weighbridge.simulation import TRUCK, RideSensors
 from weighbridge.vehicle import Driveline, TorqueModel
 

@@ -24,7 +24,7 @@ from weighbridge import (
 )
 from weighbridge.checks import check_drive, correct_drive
 from weighbridge.messages import phrase
-from weighbridge.signals.units import UNITS
+from weighbridge.signals import UNITS
 from weighbridge.vehicle import Driveline, TorqueModel
 
 GEARINGS = (45.0, 26.0, 17.5, 13.0, 10.5)

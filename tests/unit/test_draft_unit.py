@@ -8,7 +8,7 @@ import pytest
 
 from weighbridge import read_drive
 from weighbridge.io import draft, format_of, mapping_text
-from weighbridge.signals.units import UNITS
+from weighbridge.signals import UNITS
 
 TIME = np.arange(0.0, 900.0, 0.5)
 SPEED = 9.0 + 8.0 * np.sin(TIME / 35.0)  # [m/s], slow enough for any unit

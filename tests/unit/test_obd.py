@@ -9,8 +9,7 @@ from tests.noted import has, refused
 from weighbridge.io.bus import decode
 from weighbridge.io.frames import join_frames
 from weighbridge.io.obd import LENGTHS, PIDS, decode_obd
-from weighbridge.signals import QUANTITIES
-from weighbridge.signals.units import UNITS, from_si
+from weighbridge.signals import QUANTITIES, UNITS, from_si
 
 
 def answers(payloads, identifier=0x7E8, start=0.0, **rest):

@@ -20,7 +20,7 @@ from weighbridge.estimators import MassTrack
 from weighbridge.navigation import Motion
 from weighbridge.navigation.geodesy import LocalFrame
 from weighbridge.report import mass_figure, write_report
-from weighbridge.results.calibration import Calibration, DelaySearch, FittedRows
+from weighbridge.results import Calibration, DelaySearch, FittedRows
 from weighbridge.vehicle import Driveline, Provenance, RoadLoad, TorqueModel, detect_gearings
 
 MASS = 1500.0

@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.optimize import least_squares
 
 from weighbridge.constants import HUBER
-from weighbridge.signals.robust import huber, resolution, robust_fit, robust_fits, spread
+from weighbridge.signals import huber, resolution, robust_fit, robust_fits, spread
 
 
 def test_fits_together_are_those_alone():

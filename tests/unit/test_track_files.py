@@ -18,8 +18,7 @@ from tests.unit.test_weighing import weighing
 
 from weighbridge import Drive, MissingExtraError, Signal, Weighing, read_drive
 from weighbridge.io import write_mdf
-from weighbridge.signals import QUANTITIES
-from weighbridge.signals.units import to_si
+from weighbridge.signals import QUANTITIES, to_si
 
 GOLDEN = Path(__file__).parents[1] / "golden"
 

@@ -7,8 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from weighbridge.signals import Floats
-from weighbridge.signals.robust import spread
+from weighbridge.signals import Floats, spread
 from weighbridge.vehicle import DraggedReading
 
 BIN: Final = 1.12

@@ -10,8 +10,7 @@ from typing import Final
 import numpy as np
 
 from weighbridge.balance.floor import FEWEST_IN_BIN, SCATTER, Floor, find_floor
-from weighbridge.signals import Bools, Drive, Floats, Signal
-from weighbridge.signals.robust import spread
+from weighbridge.signals import Bools, Drive, Floats, Signal, spread
 from weighbridge.vehicle import DraggedReading, Vehicle
 from weighbridge.vehicle.torque import averaged
 

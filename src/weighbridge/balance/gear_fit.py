@@ -8,8 +8,7 @@ import numpy as np
 
 from weighbridge.balance.table import ForceBalance
 from weighbridge.constants import CRUISE
-from weighbridge.signals import Floats
-from weighbridge.signals.units import scalar_from_si
+from weighbridge.signals import Floats, scalar_from_si
 from weighbridge.vehicle import Vehicle
 from weighbridge.vehicle.gear import SLIPS, steady
 

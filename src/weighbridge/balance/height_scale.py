@@ -11,7 +11,7 @@ from weighbridge.balance.law import force_on_mass, mass_column
 from weighbridge.balance.table import ForceBalance
 from weighbridge.constants import GRAVITY, INDEPENDENT
 from weighbridge.messages import Problem, phrase
-from weighbridge.signals.units import UNITS
+from weighbridge.signals import UNITS
 from weighbridge.vehicle import Vehicle
 
 STEEPEST: Final = 0.6

@@ -16,10 +16,9 @@ import numpy as np
 from scipy.ndimage import median_filter
 
 from weighbridge.errors import DriveError
-from weighbridge.signals import Bools, Drive, Floats, Ints, Signal
+from weighbridge.signals import Bools, Drive, Floats, Ints, Signal, robust_fit, robust_fits
 from weighbridge.signals.correlation import correlations
 from weighbridge.signals.interpolation import interpolate
-from weighbridge.signals.robust import robust_fit, robust_fits
 from weighbridge.vehicle import SecondSignalRelation, Vehicle, source_of
 from weighbridge.vehicle.air import standard_pressure
 

@@ -22,8 +22,7 @@ from weighbridge.balance.second_signal import (
     rows_of,
 )
 from weighbridge.messages import Problem
-from weighbridge.signals import Drive, Floats
-from weighbridge.signals.robust import robust_fit, spread
+from weighbridge.signals import Drive, Floats, robust_fit, spread
 from weighbridge.vehicle import SecondSignalRelation, Vehicle, source_of
 
 CLOSED: Final = 0.15

@@ -10,8 +10,7 @@ import numpy as np
 from weighbridge.messages import Problem
 from weighbridge.navigation import Motion
 from weighbridge.navigation.identify.gain import changes_of_speed
-from weighbridge.signals import Drive, Floats
-from weighbridge.signals.units import UNITS
+from weighbridge.signals import UNITS, Drive, Floats
 
 SPAN: Final = 3.0
 """Changes of the speed are compared with those by the accelerometer over so long [s]."""

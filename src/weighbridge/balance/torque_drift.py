@@ -18,9 +18,8 @@ from weighbridge.balance.table import ForceBalance, ForceTable
 from weighbridge.errors import DriveError
 from weighbridge.messages import Problem, phrase, refused
 from weighbridge.navigation import BY_SPEED, Motion
-from weighbridge.signals import Drive, Floats, Signal
+from weighbridge.signals import Drive, Floats, Signal, median_of_three, median_slope, spread
 from weighbridge.signals.interpolation import interpolate
-from weighbridge.signals.robust import median_of_three, median_slope, spread
 from weighbridge.vehicle import Vehicle, source_of
 
 PIECE: Final = 240.0

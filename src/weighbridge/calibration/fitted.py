@@ -14,7 +14,7 @@ from weighbridge.calibration.problem import Problem
 from weighbridge.calibration.recording import DelayedRows, Recording
 from weighbridge.messages import Problem as Message
 from weighbridge.messages import refused
-from weighbridge.results.calibration import DelaySearch, FittedRows
+from weighbridge.results import DelaySearch, FittedRows
 from weighbridge.signals import Floats
 from weighbridge.vehicle import DraggedReading, Vehicle, rows_of
 from weighbridge.vehicle.model import EARLIEST_TORQUE, LATEST_TORQUE

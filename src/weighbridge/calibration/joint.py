@@ -44,7 +44,7 @@ from weighbridge.estimators.track import MassTrack
 from weighbridge.messages import Problem as Message
 from weighbridge.messages import phrase, refused
 from weighbridge.navigation import BY_SPEED
-from weighbridge.results.calibration import DelaySearch
+from weighbridge.results import DelaySearch
 from weighbridge.signals import Floats
 from weighbridge.vehicle import Driveline, Provenance, RoadLoad, Timing, Vehicle, cold_torque_std
 

@@ -11,8 +11,7 @@ from weighbridge.balance.law import ROAD_PARAMETERS, reading_columns, road_colum
 from weighbridge.balance.table import ForceTable
 from weighbridge.constants import INDEPENDENT
 from weighbridge.messages import refused
-from weighbridge.signals import Bools, Floats
-from weighbridge.signals.robust import huber, spread
+from weighbridge.signals import Bools, Floats, huber, spread
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -35,7 +35,7 @@ from weighbridge.estimators.regression import regression
 from weighbridge.estimators.rls import block_jackknife
 from weighbridge.messages import Problem as Message
 from weighbridge.messages import phrase, refused
-from weighbridge.results.calibration import DelaySearch
+from weighbridge.results import DelaySearch
 from weighbridge.signals import Floats
 from weighbridge.vehicle import (
     Driveline,

@@ -47,7 +47,7 @@ from weighbridge.pipeline.given import (
     home_of,
     mapping_of,
 )
-from weighbridge.results.calibration import Calibration
+from weighbridge.results import Calibration
 from weighbridge.signals import Drive
 from weighbridge.vehicle import Driveline, Vehicle
 from weighbridge.vehicle.fits import JOINT, RLS, SPEED_TORQUE_EKF

@@ -6,10 +6,9 @@ from typing import Final
 
 import numpy as np
 
-from weighbridge.signals import Bools, Drive, Floats, Problem, Signal
+from weighbridge.signals import Bools, Drive, Floats, Problem, Signal, resolution
 from weighbridge.signals.catalogue import IMU_SIGNALS
 from weighbridge.signals.interpolation import interpolate
-from weighbridge.signals.robust import resolution
 
 COARSEST_CUT: Final = 0.12
 """Steps up to which half a digit corrects what was cut off [m/s^2]: it leaves 0.3 to 0.6 % of the

@@ -14,9 +14,8 @@ import numpy as np
 from weighbridge.checks import windows
 from weighbridge.constants import GRAVITY
 from weighbridge.navigation.frozen import without_frozen
-from weighbridge.signals import Bools, Drive, Floats, Problem, Signal
+from weighbridge.signals import Bools, Drive, Floats, Problem, Signal, resolution
 from weighbridge.signals.catalogue import IMU_SIGNALS
-from weighbridge.signals.robust import resolution
 from weighbridge.vehicle import Vehicle
 
 # Samples enough for a median; more would only take time.

@@ -6,9 +6,8 @@ from typing import Final
 
 import numpy as np
 
-from weighbridge.signals import QUANTITIES, Drive
+from weighbridge.signals import QUANTITIES, Drive, scalar_from_si
 from weighbridge.signals.catalogue import IMU_SIGNALS
-from weighbridge.signals.units import scalar_from_si
 from weighbridge.vehicle import TORQUE_SOURCES, Vehicle, sources_of
 
 MOTION: Final = frozenset(

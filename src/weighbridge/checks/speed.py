@@ -14,10 +14,9 @@ import numpy as np
 
 from weighbridge.checks import windows
 from weighbridge.messages import phrase
-from weighbridge.signals import Drive, Floats, Problem, Signal
+from weighbridge.signals import UNITS, Drive, Floats, Problem, Signal
 from weighbridge.signals.instants import instant
 from weighbridge.signals.parts import find_splices
-from weighbridge.signals.units import UNITS
 from weighbridge.vehicle import Vehicle
 from weighbridge.vehicle.classes import FASTEST, STRONGEST
 

@@ -11,10 +11,8 @@ import numpy as np
 from weighbridge.balance.disagreement import Finding
 from weighbridge.checks.needed import show
 from weighbridge.messages import phrase
-from weighbridge.signals import Drive, Floats, Problem
+from weighbridge.signals import UNITS, Drive, Floats, Problem, resolution
 from weighbridge.signals.instants import span
-from weighbridge.signals.robust import resolution
-from weighbridge.signals.units import UNITS
 from weighbridge.vehicle import Vehicle
 
 SAME: Final = 0.003

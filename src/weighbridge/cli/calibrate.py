@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from weighbridge.calibration import CalibrationSettings, SpeedCalibration
-    from weighbridge.results.calibration import Calibration
+    from weighbridge.results import Calibration
     from weighbridge.signals import Drive
     from weighbridge.vehicle import Vehicle
 

@@ -70,7 +70,7 @@ def _asked_time(found: Draft) -> DraftTime:
 
 
 def _in_unit(time: DraftTime, unit: str) -> DraftTime:
-    from weighbridge.signals.units import UNITS
+    from weighbridge.signals import UNITS
 
     seconds = time.seconds * (UNITS[unit].factor / UNITS[time.unit].factor)
     return replace(time, unit=unit, seconds=seconds, questions=[], guessed=False)

@@ -80,7 +80,7 @@ def simulate(
 
     from weighbridge.arguments import check_choice
     from weighbridge.errors import ConfigError
-    from weighbridge.signals.units import scalar_to_si
+    from weighbridge.signals import scalar_to_si
     from weighbridge.simulation import make_scenario, simulate_car
 
     refuse_folder(inputs(), output)
@@ -177,7 +177,7 @@ def _simulate_ride(
 ) -> None:
     """Simulate and write the ride of a two-axle truck on a rough road."""
     from weighbridge.errors import ConfigError
-    from weighbridge.signals.units import scalar_to_si
+    from weighbridge.signals import scalar_to_si
     from weighbridge.simulation import TRUCK, RideScenario, simulate_ride
 
     sprung = TRUCK.sprung_mass if mass is None else mass - sum(TRUCK.unsprung_mass)

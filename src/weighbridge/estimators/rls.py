@@ -21,8 +21,7 @@ from weighbridge.estimators.regression import regression
 from weighbridge.estimators.track import MassTrack
 from weighbridge.kernels import rls as kernel
 from weighbridge.navigation import PrintedFilterSettings, mounting_of, printed_motion
-from weighbridge.signals import Bools, Drive, Floats, Ints
-from weighbridge.signals.robust import spread
+from weighbridge.signals import Bools, Drive, Floats, Ints, spread
 from weighbridge.vehicle import Vehicle
 
 NOISE_SHARE: Final = 2.0

@@ -28,8 +28,7 @@ from weighbridge.estimators.noisy_motion import USUAL_STD
 from weighbridge.estimators.regression import regression
 from weighbridge.estimators.track import MassTrack
 from weighbridge.kernels import robust_rls as kernel
-from weighbridge.signals import Bools, Floats, Ints
-from weighbridge.signals.robust import huber, spread
+from weighbridge.signals import Bools, Floats, Ints, huber, spread
 from weighbridge.vehicle import Vehicle
 from weighbridge.vehicle.possible import not_negative, positive, within
 

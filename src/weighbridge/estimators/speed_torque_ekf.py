@@ -43,8 +43,7 @@ from weighbridge.estimators.speed_samples import (
 )
 from weighbridge.estimators.track import MassTrack
 from weighbridge.kernels import speed_torque_ekf as kernel
-from weighbridge.signals import Bools, Floats
-from weighbridge.signals.robust import resolution
+from weighbridge.signals import Bools, Floats, resolution
 from weighbridge.vehicle import Vehicle, by_data_sheet, cold_torque_std, scale_std
 from weighbridge.vehicle.data_sheet import offset_std
 

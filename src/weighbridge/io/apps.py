@@ -50,8 +50,7 @@ from weighbridge.io.table import (
 )
 from weighbridge.io.tabular import read_mapped, taken
 from weighbridge.io.understood import plain_head, text_of
-from weighbridge.signals import QUANTITIES, Floats, Problem
-from weighbridge.signals.units import UNITS
+from weighbridge.signals import QUANTITIES, UNITS, Floats, Problem
 
 _Column = tuple[int, str, MappedSignal | None]
 

@@ -40,9 +40,8 @@ from weighbridge.io.mapping import (
 )
 from weighbridge.io.naming import recognise_all, unit_of
 from weighbridge.io.table import RawTable, column_list, time_seconds, unwrapped
-from weighbridge.signals import Floats, Problem
+from weighbridge.signals import UNITS, Floats, Problem
 from weighbridge.signals.tomlfile import Faults
-from weighbridge.signals.units import UNITS
 
 # Last parts of a name that say nothing of the quantity without the part before.
 _EMPTY_NAMES: Final = frozenset(

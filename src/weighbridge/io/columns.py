@@ -7,9 +7,8 @@ import re
 from typing import Final
 
 from weighbridge.io.vocabulary import SPELLED_UNITS, UNIT_TEXTS
-from weighbridge.signals import QUANTITIES, Quantity
+from weighbridge.signals import QUANTITIES, UNITS, Quantity
 from weighbridge.signals.catalogue import TIME_COLUMN
-from weighbridge.signals.units import UNITS
 
 _TIMES: Final = re.compile(r"\s*[*•⋅∙x×]\s*")
 """Signs of a product."""

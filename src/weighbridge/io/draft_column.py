@@ -12,9 +12,8 @@ import numpy as np
 from weighbridge.constants import GRAVITY
 from weighbridge.io.naming import words_of
 from weighbridge.io.vocabulary import WORDS
-from weighbridge.signals import QUANTITIES
+from weighbridge.signals import QUANTITIES, UNITS
 from weighbridge.signals.signal import Bools, Floats
-from weighbridge.signals.units import UNITS
 
 PERCENT: Final = (-130.0, 130.0)
 """Values of a torque in percent, at least and at most; J1939 has -125 to 125 %."""

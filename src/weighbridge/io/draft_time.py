@@ -15,8 +15,7 @@ from weighbridge.io.naming import is_time, unit_of, words_of
 from weighbridge.io.table import RawTable, column_list, since_1970, time_seconds
 from weighbridge.io.vocabulary import COUNTERS, TIME_WORDS
 from weighbridge.messages import Problem
-from weighbridge.signals import Floats
-from weighbridge.signals.units import UNITS
+from weighbridge.signals import UNITS, Floats
 
 RISES: Final = 0.7
 """Part of the steps of a time that do not fall [-]."""

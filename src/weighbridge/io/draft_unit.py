@@ -12,8 +12,7 @@ from weighbridge.io.columns import suffixes_of, unit_suffix
 from weighbridge.io.draft_column import Columns, changed
 from weighbridge.io.naming import unit_of
 from weighbridge.io.way import way_ratio
-from weighbridge.signals import QUANTITIES, Floats
-from weighbridge.signals.units import UNITS, to_si
+from weighbridge.signals import QUANTITIES, UNITS, Floats, to_si
 
 SPEEDS: Final = ("kmh", "mph", "mps", "kn")
 """Units in which loggers write speeds."""

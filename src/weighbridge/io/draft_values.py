@@ -27,8 +27,7 @@ from weighbridge.io.draft_unit import (
     with_judged_units,
 )
 from weighbridge.io.naming import bare_quantities, means_another, words_of
-from weighbridge.signals import QUANTITIES
-from weighbridge.signals.units import UNITS, to_si
+from weighbridge.signals import QUANTITIES, UNITS, to_si
 
 ON_BOARD: Final = 32.0
 """Battery that feeds control units, at most: those of trucks are charged at 29 V, and batteries

@@ -14,7 +14,7 @@ from weighbridge.io.file_patterns import file_patterns, undated
 from weighbridge.io.naming import words_of
 from weighbridge.io.table import column_list
 from weighbridge.io.vocabulary import WORDS, words_in
-from weighbridge.signals.units import UNITS
+from weighbridge.signals import UNITS
 
 
 def merged(drafts: Sequence[Draft]) -> Draft | None:

@@ -32,8 +32,7 @@ from weighbridge.io.table import (
 from weighbridge.io.understood import cells, plain_head
 from weighbridge.io.vocabulary import words_in
 from weighbridge.messages import Problem, refused
-from weighbridge.signals import Floats
-from weighbridge.signals.units import UNITS, from_si, to_si
+from weighbridge.signals import UNITS, Floats, from_si, to_si
 
 _COLUMNS: Final = words_in("long tables")
 _PLACES: Final = {quantity: _COLUMNS[quantity] for quantity in ("latitude", "longitude")}

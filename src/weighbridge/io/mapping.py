@@ -50,9 +50,8 @@ from weighbridge.errors import ConfigError, DriveError
 from weighbridge.io.columns import bracketed_unit, dimension_of, suffixes_of, unit_suffix
 from weighbridge.io.dbc import dbc_path, seen_from
 from weighbridge.io.table import MOST_COLUMNS, TextFormat, column_list
-from weighbridge.signals import QUANTITIES, Floats, Problem, Quantity
+from weighbridge.signals import QUANTITIES, UNITS, Floats, Problem, Quantity, to_si
 from weighbridge.signals.tomlfile import Faults, Section, read_toml
-from weighbridge.signals.units import UNITS, to_si
 
 FORMAT_VERSION: Final = 1
 """Version of the mapping file this program reads."""

@@ -28,8 +28,7 @@ from weighbridge.io.vocabulary import (
     spelled,
     words_in,
 )
-from weighbridge.signals import QUANTITIES
-from weighbridge.signals.units import UNITS
+from weighbridge.signals import QUANTITIES, UNITS
 
 _BARE: Final = frozenset(
     ("current", "voltage", "speed", "torque", "power", "temperature", "pressure", "position",

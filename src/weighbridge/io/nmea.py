@@ -23,8 +23,7 @@ from weighbridge.io.mapping import TableMapping
 from weighbridge.io.table import DAY, unwrapped
 from weighbridge.io.understood import Lines
 from weighbridge.messages import phrase
-from weighbridge.signals import Floats, Problem
-from weighbridge.signals.units import to_si
+from weighbridge.signals import Floats, Problem, to_si
 
 # Longest sentence of the standard is 82 characters; receivers send longer ones of their own.
 SENTENCE: Final = re.compile(

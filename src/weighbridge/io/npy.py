@@ -24,8 +24,7 @@ from weighbridge.errors import ConfigError, DriveError
 from weighbridge.io.libraries import parsing
 from weighbridge.io.log import Log
 from weighbridge.io.mapping import TableMapping, in_si, resolved_unit
-from weighbridge.signals import Floats
-from weighbridge.signals.units import UNITS
+from weighbridge.signals import UNITS, Floats
 
 
 def read_npy(path: Path, table: str | None, mapping: TableMapping | None) -> Log:

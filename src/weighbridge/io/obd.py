@@ -16,9 +16,8 @@ from numpy.typing import NDArray
 
 from weighbridge.io.frames import Frames, bits
 from weighbridge.io.isotp import Messages, assemble
-from weighbridge.signals import Bools, Floats, Problem, Signal
+from weighbridge.signals import Bools, Floats, Problem, Signal, scalar_from_si, scalar_to_si, to_si
 from weighbridge.signals.cleaning import clean_signal
-from weighbridge.signals.units import scalar_from_si, scalar_to_si, to_si
 from weighbridge.signals.words import counted
 
 SOURCE: Final = "SAE J1979"

@@ -35,8 +35,7 @@ from weighbridge.io.j1939 import (
 from weighbridge.io.j1939_transport import assemble as assemble_packets
 from weighbridge.io.mapping import TableMapping
 from weighbridge.io.obd import parameters_of, values_of
-from weighbridge.signals import Floats
-from weighbridge.signals.units import to_si
+from weighbridge.signals import Floats, to_si
 
 Values: TypeAlias = dict[str, tuple[Floats, Floats]]
 """By canonical name: instants (n,) [s] and values (n,) in SI."""

@@ -41,11 +41,10 @@ from weighbridge.io.table import (
     read_text,
     time_seconds,
 )
-from weighbridge.signals import QUANTITIES, Floats, Problem
+from weighbridge.signals import QUANTITIES, UNITS, Floats, Problem
 from weighbridge.signals.catalogue import TIME_COLUMN
 from weighbridge.signals.parts import find_restarts
 from weighbridge.signals.tomlfile import Faults
-from weighbridge.signals.units import UNITS
 
 _PARTED: Final = re.compile(f"[{re.escape(''.join(SEPARATORS))}]")
 

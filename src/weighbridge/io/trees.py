@@ -21,8 +21,7 @@ from weighbridge.io.mapping import TimeColumn
 from weighbridge.io.naming import is_time, unit_of
 from weighbridge.io.table import column_list, since_1970
 from weighbridge.messages import Problem
-from weighbridge.signals import Floats
-from weighbridge.signals.units import UNITS
+from weighbridge.signals import UNITS, Floats
 
 # Names of what a group holds that is called by the group's own name.
 _CONTENTS: Final = frozenset(("data", "value", "values"))

@@ -24,8 +24,7 @@ from weighbridge.io.mapping import MappedSignal, TableMapping, in_si, lacking, r
 from weighbridge.io.table import DAY, column_list, unwrapped
 from weighbridge.io.understood import Lines, number_of, text_of
 from weighbridge.io.way import way_ratio
-from weighbridge.signals import Bools, Floats, Problem
-from weighbridge.signals.units import to_si
+from weighbridge.signals import Bools, Floats, Problem, to_si
 
 _CREATED: Final = re.compile(
     r"created on (\d{1,2})/(\d{1,2})/(\d{4})(?:\s*(?:@|at)\s*(\d{1,2}):(\d{2}))?", re.IGNORECASE

@@ -25,9 +25,8 @@ from weighbridge.io.info import FILE_NAME as INFO_NAME
 from weighbridge.io.info import MDF_INFO_MARK, info_text
 from weighbridge.io.parts import SUFFIX as PARTS
 from weighbridge.io.quiet import first_line
-from weighbridge.signals import QUANTITIES, Drive, DriveInfo, Floats, Signal
+from weighbridge.signals import QUANTITIES, UNITS, Drive, DriveInfo, Floats, Signal, from_si
 from weighbridge.signals.catalogue import TABLES, TIME_COLUMN
-from weighbridge.signals.units import UNITS, from_si
 from weighbridge.version import VERSION
 from weighbridge.whole import whole_file, whole_folder
 

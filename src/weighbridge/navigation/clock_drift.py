@@ -19,9 +19,19 @@ from weighbridge.navigation.clock_lag import (
     locate_step,
 )
 from weighbridge.navigation.frozen import without_frozen
-from weighbridge.signals import QUANTITIES, Bools, Drive, Floats, Problem, Signal
+from weighbridge.signals import (
+    QUANTITIES,
+    Bools,
+    Drive,
+    Floats,
+    Problem,
+    Signal,
+    huber,
+    median_of_three,
+    median_slope,
+    spread,
+)
 from weighbridge.signals.instants import instant
-from weighbridge.signals.robust import huber, median_of_three, median_slope, spread
 
 _LOG = logging.getLogger(__name__)
 

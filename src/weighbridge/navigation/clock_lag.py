@@ -11,9 +11,8 @@ from scipy.fft import irfft, next_fast_len, rfft
 from scipy.ndimage import uniform_filter1d
 
 from weighbridge.kernels.interpolation import integral
-from weighbridge.signals import Bools, Floats, Signal
+from weighbridge.signals import Bools, Floats, Signal, resolution
 from weighbridge.signals.interpolation import interpolate
-from weighbridge.signals.robust import resolution
 
 STEP: Final = 0.2
 """Grid on which force and speed are compared [s]."""

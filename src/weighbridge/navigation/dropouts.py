@@ -8,8 +8,7 @@ import numpy as np
 
 from weighbridge.constants import GRAVITY
 from weighbridge.navigation.axes import Axes
-from weighbridge.signals import Bools, Floats, Ints
-from weighbridge.signals.robust import spread
+from weighbridge.signals import Bools, Floats, Ints, spread
 
 _LEAST_FORCE, _MOST_FORCE = 2.0, 50.0
 """No body on wheels feels less or more than so for a sample [m/s^2]."""

@@ -10,8 +10,7 @@ import numpy as np
 from weighbridge.constants import GRAVITY
 from weighbridge.kernels.interpolation import rows_before
 from weighbridge.messages import Problem, phrase
-from weighbridge.signals import Bools, Floats, Ints, Signal
-from weighbridge.signals.robust import spread
+from weighbridge.signals import Bools, Floats, Ints, Signal, spread
 
 if TYPE_CHECKING:
     from weighbridge.navigation.geodesy import LocalFrame

@@ -29,8 +29,7 @@ from weighbridge.kernels.shaking import widest_spread
 from weighbridge.navigation.aiding import Fixes, interpolated
 from weighbridge.navigation.even import Even
 from weighbridge.navigation.settings import NavigationSettings
-from weighbridge.signals import Bools, Drive, Floats, Ints, Signal
-from weighbridge.signals.robust import resolution
+from weighbridge.signals import Bools, Drive, Floats, Ints, Signal, resolution
 
 AHEAD: Final = 0.3
 """A causal pass looks so far past an instant [s], delays of the sources taken off."""

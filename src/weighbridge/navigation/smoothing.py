@@ -9,8 +9,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from weighbridge.kernels import rts
-from weighbridge.signals import Floats, Ints, Signal
-from weighbridge.signals.robust import resolution
+from weighbridge.signals import Floats, Ints, Signal, resolution
 
 _Model = tuple[Floats, Floats, float, Floats, Floats]
 """Transitions, process covariances, noise variance, first state and its covariance."""

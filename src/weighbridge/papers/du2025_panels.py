@@ -10,7 +10,7 @@ from weighbridge.papers.du2025_bus import LOADS
 from weighbridge.papers.du2025_methods import BAND, COLOURS, FORMS
 from weighbridge.papers.du2025_results import Reproduction
 from weighbridge.report.style import BLUE, GREY, VERMILLION, Panel, blank, line
-from weighbridge.signals.units import from_si
+from weighbridge.signals import from_si
 
 
 def panels(done: Reproduction) -> tuple[Panel, ...]:

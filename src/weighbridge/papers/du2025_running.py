@@ -10,8 +10,7 @@ import numpy as np
 from weighbridge.estimators import MassTrack
 from weighbridge.papers.du2025_methods import BAND
 from weighbridge.papers.reproduced import rms
-from weighbridge.signals import Bools
-from weighbridge.signals.units import scalar_to_si
+from weighbridge.signals import Bools, scalar_to_si
 
 if TYPE_CHECKING:
     from weighbridge.simulation import SimulatedDrive

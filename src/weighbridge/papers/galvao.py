@@ -57,8 +57,7 @@ from weighbridge.report.style import (
     line,
 )
 from weighbridge.report.table import Table
-from weighbridge.signals import Bools, Floats
-from weighbridge.signals.units import from_si
+from weighbridge.signals import Bools, Floats, from_si
 from weighbridge.simulation import (
     Scenario,
     simulate_car,

@@ -14,8 +14,7 @@ from weighbridge.constants import GRAVITY
 from weighbridge.papers.galvao_drives import CAR, with_grade
 from weighbridge.pipeline.speed_bounds import CoastDown, coast_down, mass_bound
 from weighbridge.report.table import Table
-from weighbridge.signals import Drive, Floats, Signal
-from weighbridge.signals.units import from_si, to_si
+from weighbridge.signals import Drive, Floats, Signal, from_si, to_si
 from weighbridge.simulation import SimulatedDrive
 from weighbridge.vehicle import Driveline, RoadLoad, Vehicle
 

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from weighbridge.errors import ConfigError
-from weighbridge.signals import Drive
-from weighbridge.signals.units import scalar_from_si, scalar_to_si
+from weighbridge.signals import Drive, scalar_from_si, scalar_to_si
 from weighbridge.simulation import Effects, make_scenario
 
 if TYPE_CHECKING:

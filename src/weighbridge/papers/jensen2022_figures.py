@@ -33,8 +33,7 @@ from weighbridge.report.style import (
     line,
 )
 from weighbridge.report.thinning import single, spread, thin_line
-from weighbridge.signals import Floats
-from weighbridge.signals.units import from_si
+from weighbridge.signals import Floats, from_si
 
 COLOURS: Final = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE)
 NAMES: Final = {"printed": "the paper's own rules", "ours": "ours"}

@@ -37,8 +37,7 @@ from weighbridge.papers.jensen2022_tables import (
     ways,
     with_units,
 )
-from weighbridge.signals import Floats
-from weighbridge.signals.units import from_si, scalar_from_si, scalar_to_si
+from weighbridge.signals import Floats, from_si, scalar_from_si, scalar_to_si
 from weighbridge.simulation import MIDSIZE
 from weighbridge.vehicle import Vehicle
 

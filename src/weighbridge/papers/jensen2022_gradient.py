@@ -15,8 +15,7 @@ from weighbridge.papers.claims import Found
 from weighbridge.papers.jensen2022_drives import CONDITIONS, Conditions, without_weather
 from weighbridge.papers.jensen2022_printed import PrintedSettings
 from weighbridge.report.style import BLUE, GREEN, GREY, VERMILLION, Panel, blank, line
-from weighbridge.signals import Floats
-from weighbridge.signals.units import from_si, scalar_from_si, scalar_to_si
+from weighbridge.signals import Floats, from_si, scalar_from_si, scalar_to_si
 from weighbridge.simulation import MIDSIZE, Braking, Route, Scenario, flat_route, simulate_car
 from weighbridge.vehicle import Vehicle
 

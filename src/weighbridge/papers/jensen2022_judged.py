@@ -15,8 +15,7 @@ from weighbridge.navigation import Motion
 from weighbridge.papers.jensen2022_drives import TestDrive
 from weighbridge.papers.reproduced import rms
 from weighbridge.pipeline.weighing import Weighing
-from weighbridge.signals import Bools, Drive, Floats
-from weighbridge.signals.units import scalar_to_si
+from weighbridge.signals import Bools, Drive, Floats, scalar_to_si
 from weighbridge.simulation import SimulatedDrive
 from weighbridge.vehicle import Vehicle
 from weighbridge.vehicle.torque_sources import air_flow_torque

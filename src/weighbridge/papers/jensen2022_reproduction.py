@@ -37,7 +37,7 @@ from weighbridge.papers.jensen2022_printed import (
 )
 from weighbridge.papers.reproduced import Progress
 from weighbridge.pipeline.weighing import weigh
-from weighbridge.results.calibration import Calibration
+from weighbridge.results import Calibration
 from weighbridge.signals import Drive, Floats
 from weighbridge.simulation import MIDSIZE, make_scenario, simulate_car
 from weighbridge.vehicle import Vehicle

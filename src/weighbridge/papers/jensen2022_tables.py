@@ -16,9 +16,8 @@ from weighbridge.papers.jensen2022_reproduction import (
     perturbed,
 )
 from weighbridge.report.table import Table
-from weighbridge.results.calibration import Calibration
-from weighbridge.signals import Floats
-from weighbridge.signals.units import scalar_from_si, scalar_to_si
+from weighbridge.results import Calibration
+from weighbridge.signals import Floats, scalar_from_si, scalar_to_si
 from weighbridge.simulation import MIDSIZE
 from weighbridge.vehicle import Vehicle
 

@@ -30,11 +30,9 @@ from weighbridge.pipeline.given import (
     mapping_of,
 )
 from weighbridge.results.writing import number
-from weighbridge.signals import QUANTITIES, Drive, Problem, Signal
+from weighbridge.signals import QUANTITIES, Drive, Problem, Signal, from_si, resolution
 from weighbridge.signals.catalogue import IMU_SIGNALS
-from weighbridge.signals.robust import resolution
 from weighbridge.signals.shown import in_html, in_lines, plural
-from weighbridge.signals.units import from_si
 from weighbridge.vehicle import (
     TORQUE_SOURCES,
     TorqueSource,

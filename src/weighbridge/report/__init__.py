@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
     from weighbridge.report.style import Panel
     from weighbridge.report.table import Table
-    from weighbridge.results.calibration import Calibration
+    from weighbridge.results import Calibration
     from weighbridge.results.weighing import MassResult
 
 __all__ = ["mass_figure", "write_report"]

@@ -10,11 +10,10 @@ from weighbridge.balance import Reason
 from weighbridge.report.style import BLUE, GREY, ORANGE, VERMILLION, Panel, blank, dots, line
 from weighbridge.report.text import amount
 from weighbridge.report.thinning import single, spread, thin_line
-from weighbridge.signals import Floats
-from weighbridge.signals.units import from_si, scalar_from_si
+from weighbridge.signals import Floats, from_si, scalar_from_si
 
 if TYPE_CHECKING:
-    from weighbridge.results.calibration import Calibration
+    from weighbridge.results import Calibration
 
 GEAR_COLOURS = (BLUE, ORANGE, "#009e73", "#b0679b", VERMILLION, "#2f95cf", "#9a8a2e", "#6b7a99")
 

@@ -30,8 +30,7 @@ from weighbridge.report.style import (
 from weighbridge.report.table import Table
 from weighbridge.report.text import amount
 from weighbridge.report.thinning import thin_line
-from weighbridge.signals import Bools, Floats, Ints
-from weighbridge.signals.units import scalar_from_si, scalar_to_si
+from weighbridge.signals import Bools, Floats, Ints, scalar_from_si, scalar_to_si
 
 if TYPE_CHECKING:
     from weighbridge.results.weighing import MassResult

@@ -20,8 +20,7 @@ from weighbridge.report.style import (
     title_in_shown_units,
 )
 from weighbridge.report.thinning import single, spread
-from weighbridge.signals import Bools, Floats
-from weighbridge.signals.units import from_si
+from weighbridge.signals import Bools, Floats, from_si
 
 if TYPE_CHECKING:
     from weighbridge.report.tiles import Tiles

@@ -29,8 +29,7 @@ from weighbridge.report.style import (
 )
 from weighbridge.report.text import kg
 from weighbridge.report.thinning import SCATTER_POINTS, single, spread, thin_line
-from weighbridge.signals import Floats
-from weighbridge.signals.units import from_si
+from weighbridge.signals import Floats, from_si
 
 if TYPE_CHECKING:
     from weighbridge.results.weighing import MassResult

@@ -37,7 +37,7 @@ from weighbridge.report.text import (
 
 if TYPE_CHECKING:
     from weighbridge.report.tiles import Tiles
-    from weighbridge.results.calibration import Calibration
+    from weighbridge.results import Calibration
     from weighbridge.results.weighing import MassResult
 
 log = logging.getLogger(__name__)

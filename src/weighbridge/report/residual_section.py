@@ -15,8 +15,7 @@ from weighbridge.report.methods_section import apart, method_style
 from weighbridge.report.style import BLUE, GREY, VERMILLION, Panel, Section, blank, dots, line
 from weighbridge.report.text import amount
 from weighbridge.report.thinning import single, spread
-from weighbridge.signals import Bools, Floats
-from weighbridge.signals.units import from_si
+from weighbridge.signals import Bools, Floats, from_si
 
 if TYPE_CHECKING:
     from weighbridge.results.weighing import MassResult

@@ -23,8 +23,7 @@ from weighbridge.report.style import (
 )
 from weighbridge.report.text import amount
 from weighbridge.report.thinning import spread, thin_line
-from weighbridge.signals import Floats
-from weighbridge.signals.units import from_si
+from weighbridge.signals import Floats, from_si
 
 if TYPE_CHECKING:
     from weighbridge.report.tiles import Tiles

@@ -31,8 +31,7 @@ from weighbridge.report.style import (
 from weighbridge.report.table import Table
 from weighbridge.report.text import amount
 from weighbridge.report.thinning import SCATTER_POINTS, single, thin_line
-from weighbridge.signals import Bools, Drive, Floats
-from weighbridge.signals.units import from_si, scalar_from_si
+from weighbridge.signals import Bools, Drive, Floats, from_si, scalar_from_si
 
 if TYPE_CHECKING:
     from weighbridge.report.tiles import Tiles

@@ -13,8 +13,7 @@ from scipy.special import ndtri
 from weighbridge.balance import REASON_TEXT, Reason
 from weighbridge.customary import shown_amount, shown_unit
 from weighbridge.report.table import Table
-from weighbridge.signals import Drive, Floats
-from weighbridge.signals.units import from_si
+from weighbridge.signals import Drive, Floats, from_si
 
 BLUE: Final = "#2b7bba"
 VERMILLION: Final = "#d55e00"

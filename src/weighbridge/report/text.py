@@ -8,7 +8,7 @@ from html import escape
 from typing import TYPE_CHECKING, Final
 
 from weighbridge.customary import shown_amount, shown_unit
-from weighbridge.signals.units import scalar_from_si
+from weighbridge.signals import scalar_from_si
 
 if TYPE_CHECKING:
     from weighbridge.results.weighing import MassResult

@@ -11,8 +11,7 @@ import numpy as np
 import pymap3d
 
 from weighbridge.errors import ConfigError
-from weighbridge.signals import Floats
-from weighbridge.signals.units import from_si
+from weighbridge.signals import Floats, from_si
 from weighbridge.visible import visible
 
 MOST: Final = 30

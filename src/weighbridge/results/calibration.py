@@ -8,9 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from weighbridge.balance import ForceBalance
-from weighbridge.signals import Floats, Ints, Problem
-from weighbridge.signals.robust import huber, spread
-from weighbridge.signals.units import scalar_from_si
+from weighbridge.signals import Floats, Ints, Problem, huber, scalar_from_si, spread
 from weighbridge.vehicle import GearDetection, Vehicle
 
 

@@ -4,7 +4,25 @@ from weighbridge.messages import Problem
 from weighbridge.signals.catalogue import QUANTITIES, Quantity
 from weighbridge.signals.drive import Drive, DriveInfo
 from weighbridge.signals.recent import BEHIND, LONGEST_STEP, STEP, STEPS, instants, recent
+from weighbridge.signals.robust import (
+    huber,
+    median_of_three,
+    median_slope,
+    resolution,
+    robust_fit,
+    robust_fits,
+    spread,
+)
 from weighbridge.signals.signal import Bools, Floats, Ints, Signal
+from weighbridge.signals.units import (
+    UNITS,
+    Unit,
+    from_si,
+    scalar_from_si,
+    scalar_to_si,
+    to_si,
+    unit,
+)
 
 __all__ = [
     "BEHIND",
@@ -12,6 +30,7 @@ __all__ = [
     "QUANTITIES",
     "STEP",
     "STEPS",
+    "UNITS",
     "Bools",
     "Drive",
     "DriveInfo",
@@ -20,6 +39,19 @@ __all__ = [
     "Problem",
     "Quantity",
     "Signal",
+    "Unit",
+    "from_si",
+    "huber",
     "instants",
+    "median_of_three",
+    "median_slope",
     "recent",
+    "resolution",
+    "robust_fit",
+    "robust_fits",
+    "scalar_from_si",
+    "scalar_to_si",
+    "spread",
+    "to_si",
+    "unit",
 ]

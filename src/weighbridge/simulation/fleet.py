@@ -14,8 +14,7 @@ from typing import Final, Literal, get_args
 import numpy as np
 
 from weighbridge.errors import ConfigError
-from weighbridge.signals import Drive, Signal
-from weighbridge.signals.robust import resolution
+from weighbridge.signals import Drive, Signal, resolution
 from weighbridge.simulation.car import SimulatedCar
 from weighbridge.simulation.named import TORQUE_POLLING, usual_polling
 from weighbridge.simulation.route import RoadKind, Route, mixed_route

@@ -19,8 +19,7 @@ from weighbridge.constants import (
 )
 from weighbridge.errors import ConfigError
 from weighbridge.kernels.simulated_driveline import DRIVING
-from weighbridge.signals import QUANTITIES, Floats, Signal
-from weighbridge.signals.units import scalar_to_si
+from weighbridge.signals import QUANTITIES, Floats, Signal, scalar_to_si
 from weighbridge.simulation.hybrid import volts_and_amps
 from weighbridge.simulation.longitudinal import DT
 

@@ -14,8 +14,7 @@ import numpy as np
 from weighbridge.arguments import check_choice
 from weighbridge.constants import GRAVITY
 from weighbridge.io.write import TableFormat, write_drive
-from weighbridge.signals import Drive, DriveInfo, Floats, Signal
-from weighbridge.signals.units import from_si
+from weighbridge.signals import Drive, DriveInfo, Floats, Signal, from_si
 from weighbridge.simulation.body import Pose, simulate_pose
 from weighbridge.simulation.hybrid import shared
 from weighbridge.simulation.longitudinal import DT, Trajectory, simulate_trajectory

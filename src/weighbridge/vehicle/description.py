@@ -14,7 +14,7 @@ from weighbridge.constants import (
     STANDARD_PRESSURE,
     STANDARD_TEMPERATURE,
 )
-from weighbridge.signals.units import scalar_from_si
+from weighbridge.signals import scalar_from_si
 from weighbridge.vehicle.data_sheet import (
     by_data_sheet,
     needs_calibration,

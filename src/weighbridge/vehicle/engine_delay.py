@@ -6,9 +6,8 @@ from typing import Final
 
 import numpy as np
 
-from weighbridge.signals import Bools, Floats, Ints
+from weighbridge.signals import Bools, Floats, Ints, huber, spread
 from weighbridge.signals.interpolation import interpolate
-from weighbridge.signals.robust import huber, spread
 from weighbridge.vehicle.gear import (
     HIGHEST_GEARING,
     LOWEST_GEARING,

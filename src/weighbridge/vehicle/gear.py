@@ -10,8 +10,7 @@ from typing import Final
 import numpy as np
 
 from weighbridge.messages import refused
-from weighbridge.signals import Bools, Floats, Ints, Signal
-from weighbridge.signals.robust import spread
+from weighbridge.signals import Bools, Floats, Ints, Signal, spread
 
 LOWEST_GEARING: Final = 1.8
 """Below any gear of a road vehicle, engine angle per distance [1/m]: a motor in the hub turns as

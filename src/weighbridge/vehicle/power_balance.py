@@ -17,8 +17,7 @@ import numpy as np
 
 from weighbridge.constants import INDEPENDENT
 from weighbridge.messages import Problem
-from weighbridge.signals import Bools, Drive, Floats, Signal
-from weighbridge.signals.robust import robust_fit
+from weighbridge.signals import Bools, Drive, Floats, Signal, robust_fit
 from weighbridge.vehicle.data_sheet import by_data_sheet, torque_std
 from weighbridge.vehicle.force_sources import SLOWEST_POWER
 from weighbridge.vehicle.model import Vehicle

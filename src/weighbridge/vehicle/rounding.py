@@ -8,8 +8,8 @@ from typing import Any, Final
 
 import numpy as np
 
+from weighbridge.signals import UNITS
 from weighbridge.signals.tomlfile import exact_text, rounded_text
-from weighbridge.signals.units import UNITS
 from weighbridge.vehicle.file_keys import Key
 
 BEYOND: Final = 3

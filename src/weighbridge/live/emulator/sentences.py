@@ -10,8 +10,7 @@ from typing import Final
 
 import numpy as np
 
-from weighbridge.signals import Drive
-from weighbridge.signals.units import scalar_from_si
+from weighbridge.signals import Drive, scalar_from_si
 
 _HDOP: Final = 1.0
 

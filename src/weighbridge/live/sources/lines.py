@@ -21,7 +21,7 @@ from weighbridge.live.device_clock import DeviceClock
 from weighbridge.live.source import Samples
 from weighbridge.live.sources.gathered import BLOCK, Gathered
 from weighbridge.live.sources.kind import SourceOptions, checked_port
-from weighbridge.signals.units import scalar_to_si
+from weighbridge.signals import scalar_to_si
 
 _logger = logging.getLogger(__name__)
 

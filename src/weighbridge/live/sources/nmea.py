@@ -10,7 +10,7 @@ from weighbridge.live.device_clock import DeviceClock
 from weighbridge.live.sources.kind import SourceOptions
 from weighbridge.live.sources.links import serial_or_tcp
 from weighbridge.live.sources.receiver import ReceiverSource
-from weighbridge.signals.units import scalar_to_si
+from weighbridge.signals import scalar_to_si
 
 BAUD: Final = 9600
 """Rate that receivers leave the works with [bit/s]."""

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Final, NamedTuple
 
 from weighbridge.io.obd import LENGTHS
-from weighbridge.signals.units import scalar_to_si
+from weighbridge.signals import scalar_to_si
 
 _SPEED, _ENGINE_SPEED, _LOAD, _TORQUE = 0x0D, 0x0C, 0x04, 0x62
 _THROTTLE, _PRESSURE, _AIR_FLOW = 0x11, 0x0B, 0x10

@@ -14,8 +14,7 @@ from weighbridge.constants import GRAVITY, INDEPENDENT, SAMPLES_AT_ONCE
 from weighbridge.navigation.axes import Axes
 from weighbridge.navigation.identify.steps import fitted
 from weighbridge.navigation.motion import Motion
-from weighbridge.signals import Floats, Signal
-from weighbridge.signals.robust import resolution, spread
+from weighbridge.signals import Floats, Signal, resolution, spread
 
 _STEP: Final = 0.25
 """Faster speeds are thinned to it [s]."""

@@ -12,8 +12,7 @@ import numpy as np
 from weighbridge.constants import GRAVITY
 from weighbridge.errors import DriveError
 from weighbridge.messages import Problem, refused
-from weighbridge.signals import Bools, Floats
-from weighbridge.signals.robust import huber
+from weighbridge.signals import Bools, Floats, huber
 
 _LOG = logging.getLogger(__name__)
 
