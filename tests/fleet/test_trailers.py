@@ -2,33 +2,34 @@
 
 import math
 
-import polars as pl
 import pytest
 from scipy.integrate import quad
 from scipy.stats import expon, norm
 
 from tests.fleet.made_rows import drive, reported
-from weighbridge.fleet.trailers import with_trailers
 
 SHOWN = {"drag_area_std_m2": 0.5, "slip_std": 0.007, "late_s": 0.05, "late_std_s": 0.01,
          "slip_late": 0.0}  # fmt: skip
 
 
-def legs(*rows, tare=9000.0, gross=18000.0):
-    """Legs of one truck: (mass, drag area, slip)."""
-    vehicle = {"vehicle_id": "t", "vehicle_digest": "x", "vehicle_class": "truck",
-               "tare_kg": tare, "gross_kg": gross, "coupled": False}  # fmt: skip
-    return pl.DataFrame(
-        [
-            vehicle | SHOWN | {"mass_kg": float(mass), "std_kg": 0.03 * mass}
-            | {"drag_area_m2": area, "slip": slip} | (more[0] if more else {})
-            for mass, area, slip, *more in rows
-        ]
-    ).with_columns(trailer_connected=pl.lit(None, pl.Boolean))  # fmt: skip
+def said(*rows, tare=9000.0, gross=18000.0):
+    """Drives of one truck, one on each day: (mass, drag area, slip)."""
+    return [
+        drive(str(k), start=f"2026-05-{k + 1:02d}T06:00:00+00:00", mass=mass, std=0.03 * mass,
+              drag_area_m2=area, slip=slip, tare_kg=tare, gross_kg=gross,
+              **SHOWN | (more[0] if more else {}))
+        for k, (mass, area, slip, *more) in enumerate(rows)
+    ]  # fmt: skip
+
+
+def probability(drives, **how):
+    """Probability of a trailer of each leg that a report has, in the order of time."""
+    legs = reported(drives, **how).legs.sort("start")
+    return legs["trailer_probability"].to_list()
 
 
 def probabilities(*rows, **how):
-    return with_trailers(legs(*rows, **how))["trailer_probability"].to_list()
+    return probability(said(*rows, **how))
 
 
 OTHERS = [(m, 0.1 * k - 0.3, 0.027 + 0.001 * k) for k, m in enumerate(range(9000, 17000, 1200))]
@@ -86,13 +87,11 @@ def test_the_bit_of_the_vehicle_decides():
     # By mass, drag area and slip the first had a trailer, and the others had none.
     shown = [(24000.0, 1.6, 0.060), *OTHERS]
     bits = [False, True, *[None] * (len(OTHERS) - 1)]
-    said = [
-        drive(str(k), start=f"2026-05-{k + 1:02d}T06:00:00+00:00", mass=float(m), std=0.03 * m,
-              drag_area_m2=a, slip=s, tare_kg=9000.0, trailer_connected=bit,
-              maker_mass_kg=m + 100.0, **SHOWN)
-        for k, ((m, a, s), bit) in enumerate(zip(shown, bits, strict=True))
-    ]  # fmt: skip
-    rows = reported(said).legs.sort("start")
+    told = [
+        row | {"trailer_connected": bit, "maker_mass_kg": row["mass_kg"] + 100.0}
+        for row, bit in zip(said(*shown), bits, strict=True)
+    ]
+    rows = reported(told).legs.sort("start")
     assert rows["trailer_probability"].to_list()[:2] == [0.0, 1.0]
     assert rows["coupled"].to_list() == [bit is True for bit in bits]
     assert rows["trailer"].to_list() == [bit is True for bit in bits]
@@ -101,34 +100,36 @@ def test_the_bit_of_the_vehicle_decides():
     assert rows["level"].to_list()[:3] == ["alarm", None, "ok"]
     assert rows["permitted_kg"].to_list()[:3] == [18000.0, None, 18000.0]
     assert rows["reason_id"].to_list()[:3] == [None, "fleet.trailer_reported", None]
-    untold = [row | {"trailer_connected": None} for row in said]
-    assert reported(untold).legs.sort("start")["trailer_probability"][0] > 0.9
+    assert probabilities(*shown)[0] > 0.9
 
 
-def test_an_announced_trailer_is_sure_and_does_not_move_the_vehicle():
-    rows = legs(*OTHERS, (24000.0, 1.6, 0.060), (24000.0, 1.6, 0.060), (24000.0, 1.6, 0.060))
-    known = rows.with_columns(coupled=pl.col("mass_kg") > 20000.0)
-    found = with_trailers(known)["trailer_probability"].to_list()
+def test_an_announced_trailer_is_sure_and_does_not_move_the_vehicle(tmp_path):
+    towed = [(24000.0, 1.6, 0.060)] * 3
+    couplings = tmp_path / "couplings.csv"
+    first = f"2026-05-{len(OTHERS) + 1:02d}T00:00:00+00:00"
+    couplings.write_text(
+        f"vehicle,start,end,permitted_kg\ntruck1,{first},2026-05-31T00:00:00+00:00,36000\n"
+    )
+    found = probability(said(*OTHERS, *towed), couplings=couplings)
     assert found[-3:] == [1.0] * 3
     assert max(found[:-3]) < 0.05
 
 
 def test_vehicles_and_files_are_compared_with_themselves_alone():
-    other = legs((17500.0, 1.8, 0.055)).with_columns(vehicle_digest=pl.lit("y"))
-    *_, found = with_trailers(pl.concat([legs(*OTHERS), other]))["trailer_probability"]
-    assert found < 0.5
+    *rest, last = said(*OTHERS, (17500.0, 1.8, 0.055))
+    drives = [*(row | {"vehicle_digest": "x"} for row in rest), last | {"vehicle_digest": "y"}]
+    assert probability(drives)[-1] < 0.5
 
 
 def test_what_is_not_known_has_no_probability():
-    rows = legs((12000.0, 0.1, 0.03), (12000.0, 0.1, 0.03)).with_columns(
-        mass_kg=pl.Series([None, 12000.0]), gross_kg=pl.Series([18000.0, None])
-    )
-    assert with_trailers(rows)["trailer_probability"].to_list() == [None, None]
+    lone, untold = said((12000.0, 0.1, 0.03), (12000.0, 0.1, 0.03))
+    drives = [lone | {"mass_kg": None, "std_kg": None}, untold | {"gross_kg": None}]
+    assert probability(drives) == [None, None]
 
 
 def test_a_bus_draws_no_trailer_by_its_drag_area():
-    rows = legs(*OTHERS, (17500.0, 1.8, 0.055)).with_columns(vehicle_class=pl.lit("bus"))
-    assert with_trailers(rows)["trailer_probability"].to_list()[-1] < 0.05
+    drives = said(*OTHERS, (17500.0, 1.8, 0.055))
+    assert probability([row | {"vehicle_class": "bus"} for row in drives])[-1] < 0.05
 
 
 def test_a_fleet_reports_it():
