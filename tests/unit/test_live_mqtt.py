@@ -16,7 +16,6 @@ from tests.unit.made_weighings import drive, weighing
 
 from weighbridge import ConfigError, LiveStatus, WeighbridgeError
 from weighbridge.live import Alert, Mqtt, parse_broker
-from weighbridge.live.outputs.outbox import Outbox
 
 amqtt_broker = pytest.importorskip("amqtt.broker", reason="amqtt is not installed")
 from amqtt.plugins.base import BasePlugin  # noqa: E402
@@ -117,6 +116,17 @@ def sender(port, folder, **kwargs):
     kwargs = {"period": 0.0, "pauses": (0.05, 0.2), **kwargs}
     place = parse_broker(f"mqtt://127.0.0.1:{port}/fleet")
     return Mqtt(place, "Delivery van", folder / "outbox.sqlite", **kwargs)
+
+
+def lost(folder, name="outbox.sqlite"):
+    """A sender whose broker is not there: all that it is shown waits."""
+    return Mqtt(parse_broker("mqtt://127.0.0.1:1/fleet"), "Delivery van", folder / name, period=0.0)
+
+
+def held(mqtt):
+    """Instants of the weighings that wait."""
+    waiting = mqtt._outbox.after(0, 9999)
+    return [json.loads(m.payload)["time_s"] for m in waiting if m.topic == TOPIC]
 
 
 def in_order(payloads):
@@ -396,10 +406,9 @@ def test_the_last_weighing_is_sent_at_the_end_and_what_waits_for_nothing_new_onc
     assert [(w["time_s"], w["parked"]) for w in sent] == [(100.0, False), (103.0, True)]
     mqtt.show(weighing(104.5, newest=106.0, parked=True))
     mqtt.close()
-    box = Outbox(tmp_path / "outbox.sqlite")
-    sent = [json.loads(m.payload) for m in box.after(0, 99) if m.topic == TOPIC]
-    box.close()
-    assert [w["time_s"] for w in sent] == [100.0, 103.0, 104.5]
+    again = lost(tmp_path)
+    assert held(again) == [100.0, 103.0, 104.5]
+    again.close()
 
 
 def test_before_the_first_mass_it_is_told_how_far_it_is(tmp_path):
@@ -416,72 +425,78 @@ def test_before_the_first_mass_it_is_told_how_far_it_is(tmp_path):
 
 
 def test_an_outbox_has_one_owner(tmp_path):
-    first = Outbox(tmp_path / "box")
+    first = lost(tmp_path)
     with pytest.raises(ConfigError, match="is used by another weighbridge"):
-        Outbox(tmp_path / "box")
-    first.put([("a", b"1")])
+        lost(tmp_path)
+    first.show(weighing(1.0))
     first.close()
-    second = Outbox(tmp_path / "box")
-    assert [m.payload for m in second.after(0, 9)] == [b"1"]
+    second = lost(tmp_path)
+    assert held(second)[0] == 1.0
     # One that was there before has it as well.
     with pytest.raises(ConfigError, match="end that one"):
-        Outbox(tmp_path / "box")
+        lost(tmp_path)
     second.close()
 
 
 def test_a_damaged_outbox_is_set_aside(tmp_path, caplog):
-    path = tmp_path / "box"
-    box = Outbox(path)
-    box.put([("topic", b"x" * 200)] * 500)
-    box.close()
+    mqtt = lost(tmp_path)
+    for w in drive(100):
+        mqtt.show(w)
+    mqtt.close()
+    path = tmp_path / "outbox.sqlite"
     data = bytearray(path.read_bytes())
     data[100:30_000] = b"\xa5" * 29_900
     path.write_bytes(data)
-    fresh = Outbox(path)
-    fresh.put([("a", b"1")])
-    assert len(fresh) == 1
+    fresh = lost(tmp_path)
+    fresh.show(weighing(1.0))
+    assert held(fresh) == [1.0]
     fresh.close()
-    assert (tmp_path / "box.damaged").exists()
+    assert (tmp_path / "outbox.sqlite.damaged").exists()
     assert "set aside" in caplog.text
 
 
 def test_files_of_something_else_are_no_outbox(tmp_path):
     (tmp_path / "car.toml").write_text("[vehicle]\n" * 200)
     with error(ConfigError, "car.toml"):
-        Outbox(tmp_path / "car.toml")
+        lost(tmp_path, "car.toml")
     assert (tmp_path / "car.toml").exists()
     with sqlite3.connect(tmp_path / "other") as other:
         other.execute("CREATE TABLE messages (a)")
     other.close()
     with error(ConfigError, "other"):
-        Outbox(tmp_path / "other")
+        lost(tmp_path, "other")
     with pytest.raises(ConfigError, match="cannot be used as an outbox"):
-        Outbox(tmp_path)
+        lost(tmp_path, ".")
 
 
 def test_what_was_taken_is_not_sent_again_where_the_disk_is_full(tmp_path):
-    box = Outbox(tmp_path / "box")
-    box.put([("t", bytes([k])) for k in range(4)])
-    box._database.execute("PRAGMA query_only = 1")
-    box.remove([1, 2])
-    assert [m.number for m in box.after(0, 1)] == [3]
-    assert len(box) == 2
-    box._database.execute("PRAGMA query_only = 0")
-    box.remove([3])
-    assert len(box) == 1
-    box.close()
-    again = Outbox(tmp_path / "box")
-    assert [m.payload for m in again.after(0, 9)] == [bytes([3])]
+    with broker() as port:
+        pass
+    mqtt = sender(port, tmp_path)
+    for k in range(4):
+        mqtt.show(weighing(float(k)))
+    disk = mqtt._outbox._database
+    disk.execute("PRAGMA query_only = 1")
+    with broker(port):
+        until(lambda: mqtt.waiting == 0)
+        disk.execute("PRAGMA query_only = 0")
+        mqtt.show(weighing(4.0))
+        until(lambda: mqtt.waiting == 0)
+        mqtt.close()
+    assert [json.loads(p)["time_s"] for p in Taken.of(TOPIC)] == [0.0, 1.0, 2.0, 3.0, 4.0]
+    again = lost(tmp_path)
+    assert again.waiting == 0
     again.close()
 
 
 def test_a_full_disk_is_told_and_weighing_goes_on(tmp_path):
-    box = Outbox(tmp_path / "box")
-    pages = box._database.execute("PRAGMA page_count").fetchone()[0]
-    box._database.execute(f"PRAGMA max_page_count = {pages + 2}")
-    with error(WeighbridgeError, "box"):
-        box.put([("a", b"x" * 100_000)])
-    assert len(box) == 0
-    box.put([("a", b"small")])
-    assert [m.payload for m in box.after(0, 9)] == [b"small"]
-    box.close()
+    mqtt = lost(tmp_path)
+    disk = mqtt._outbox._database
+    pages = disk.execute("PRAGMA page_count").fetchone()[0]
+    disk.execute(f"PRAGMA max_page_count = {pages + 2}")
+    with error(WeighbridgeError, "outbox.sqlite"):
+        mqtt.show(weighing(0.0, advice="x" * 100_000))
+    assert mqtt.waiting == 0
+    mqtt.show(weighing(1.0))
+    assert held(mqtt) == [1.0]
+    mqtt.close()
