@@ -26,7 +26,7 @@ from weighbridge.pipeline.forward import (
     step,
     with_open,
 )
-from weighbridge.signals import LONGEST_STEP, STEP, instants, recent
+from weighbridge.signals import LONGEST_STEP, STEP, recent, step_ends
 from weighbridge.simulation import MIDSIZE, Loading, Scenario, short_route, simulate_car
 
 
@@ -534,7 +534,7 @@ def test_a_look_soon_after_a_stop_leaves_the_other_load_on_trial(car, delivered)
     assert state.joint.load.open
     new = made.scenario.mass + 400.0
     assert abs(state.joint.mass - new) < 4.0 * state.joint.std(setup.joint)
-    for until in instants(part, LONGEST_STEP):
+    for until in step_ends(part, LONGEST_STEP):
         if until > soon.end:
             seen = recent(part, until, LONGEST_STEP)
             state, running = step(state, seen, until, setup)

@@ -15,7 +15,7 @@ from weighbridge.estimators.judging import STOP
 from weighbridge.kernels import window_means
 from weighbridge.navigation import forward as navigation
 from weighbridge.pipeline.forward import forward_weigh, identify_forward, lateness
-from weighbridge.signals import STEP, instants, recent
+from weighbridge.signals import STEP, recent, step_ends
 from weighbridge.simulation import (
     MIDSIZE,
     TRUCK18,
@@ -240,7 +240,7 @@ def rows_by_steps(drive, setup):
     """All rows of a drive, as the stages find them step by step; and the whole motion."""
     motion, force = navigation.begin(setup.navigation, drive.start), rows.begin()
     parts, moved = [], []
-    for until in instants(drive, setup.step):
+    for until in step_ends(drive, setup.step):
         records = recent(drive, until, setup.step)
         motion, found = navigation.step(motion, records, until, setup.navigation)
         if found is not None:

@@ -52,7 +52,7 @@ from weighbridge.navigation.rows import (
 )
 from weighbridge.navigation.sources import Sources, undelayed
 from weighbridge.navigation.state import State
-from weighbridge.signals import BEHIND, Bools, Drive, Floats, Signal, instants, recent
+from weighbridge.signals import BEHIND, Bools, Drive, Floats, Signal, recent, step_ends
 from weighbridge.signals.catalogue import IMU_SIGNALS
 
 LAID_OUT: Final = 0.25
@@ -276,7 +276,7 @@ def forward_motion(drive: Drive, setup: Setup) -> Motion:
         Signals are missing.
     """
     state, parts = begin(setup, drive.start), []
-    for until in instants(drive):
+    for until in step_ends(drive):
         state, rows = step(state, recent(drive, until), until, setup)
         if rows is not None:
             parts.append(rows)

@@ -36,7 +36,7 @@ from weighbridge.kernels import window_means
 from weighbridge.kernels.ins_model import E_SQUAT, SQUAT
 from weighbridge.navigation import forward
 from weighbridge.navigation.select import scaled_for_navigation
-from weighbridge.signals import STEP, STEPS, Drive, Floats, instants, recent
+from weighbridge.signals import STEP, STEPS, Drive, Floats, recent, step_ends
 from weighbridge.vehicle import Vehicle
 from weighbridge.vehicle.torque import reading_battery
 
@@ -393,7 +393,7 @@ def forward_weigh(drive: Drive, setup: ForwardSetup) -> ForwardTrack:
     setup : of `identify_forward`
     """
     state, parts = begin(setup, drive.start), [NO_WINDOWS]
-    for until in instants(drive, setup.step):
+    for until in step_ends(drive, setup.step):
         state, running = step(state, recent(drive, until, setup.step), until, setup)
         parts.append(running)
     time, mass, std = (np.concatenate(rows) for rows in zip(*parts, strict=True))

@@ -3,7 +3,7 @@
 from weighbridge.messages import Problem
 from weighbridge.signals.catalogue import QUANTITIES, Quantity
 from weighbridge.signals.drive import Drive, DriveInfo
-from weighbridge.signals.recent import BEHIND, LONGEST_STEP, STEP, STEPS, instants, recent
+from weighbridge.signals.recent import BEHIND, LONGEST_STEP, STEP, STEPS, recent, step_ends
 from weighbridge.signals.robust import (
     huber,
     median_of_three,
@@ -42,7 +42,6 @@ __all__ = [
     "Unit",
     "from_si",
     "huber",
-    "instants",
     "median_of_three",
     "median_slope",
     "recent",
@@ -52,6 +51,7 @@ __all__ = [
     "scalar_from_si",
     "scalar_to_si",
     "spread",
+    "step_ends",
     "to_si",
     "unit",
 ]

@@ -69,7 +69,7 @@ def last_instant(time: float) -> float:
     return math.floor(time / STEPS[0]) * STEPS[0]
 
 
-def instants(drive: Drive, step: float = STEP) -> Floats:
+def step_ends(drive: Drive, step: float = STEP) -> Floats:
     """Ends of the steps (n,) of so long that a drive is taken in [s].
 
     There are none where all signals have been silent for longer than `BEHIND`.
