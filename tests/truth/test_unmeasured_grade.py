@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from weighbridge import Vehicle
+from weighbridge.balance.law import force_on_mass
 from weighbridge.constants import GRAVITY
-from weighbridge.estimators import ESTIMATORS, unmeasured_grade
+from weighbridge.estimators import ESTIMATORS
 from weighbridge.kernels import multiple_forgetting
 from weighbridge.papers.jensen2022_drives import without_weather
 from weighbridge.pipeline.weighing import torque_balance
@@ -141,13 +142,12 @@ def test_no_row_is_no_mass(truck, method):
 
 def test_rows_settle_after_each_interruption(truck):
     balance, car = truck
-    rows = unmeasured_grade.settled_rows(
-        balance, car, unmeasured_grade.UnmeasuredGradeSettings(settle=2.0)
-    )
+    batch = ESTIMATORS["ritter-batch"]
+    taken = np.flatnonzero(batch.track(balance, car, batch.settings_of({"settle": 2.0})).used)
     used = balance.table.usable
-    before = [used[max(k - 39, 0) : k + 1].all() for k in rows.taken]
+    before = [used[max(k - 39, 0) : k + 1].all() for k in taken]
     assert all(before)
-    assert 0.5 < rows.taken.size / np.count_nonzero(used) < 0.95
+    assert 0.5 < taken.size / np.count_nonzero(used) < 0.95
 
 
 def test_without_gravity_the_recursion_is_least_squares_that_forgets():
@@ -176,12 +176,12 @@ def test_the_grade_takes_what_its_forgetting_leaves_it():
 def test_the_batch_is_one_least_squares_of_mass_and_every_grade(truck):
     balance, car = truck
     settings = ESTIMATORS["ritter-batch"].settings()
-    rows = unmeasured_grade.settled_rows(balance, car, settings)
-    taken = rows.taken[:400]
+    taken = np.flatnonzero(ESTIMATORS["ritter-batch"].track(balance, car).used)[:400]
     reason = balance.table.reason.copy()
     reason[taken[-1] + 1 :] = 4
     short = replace(balance, table=replace(balance.table, reason=reason))
-    time, force, accel = rows.time[taken], rows.force[taken], rows.accel[taken]
+    time, accel = balance.table.time[taken], balance.table.accel[taken]
+    force = force_on_mass(balance.table, car)[taken]
     n = taken.size
     walk = GRAVITY * settings.grade_walk * np.sqrt(np.diff(time))
     errors = np.column_stack([1e-4 * force, np.eye(n)]) / settings.accel_noise
