@@ -33,8 +33,7 @@ from weighbridge.io.frame_text import read_candump
 from weighbridge.io.j1939 import decode_j1939
 from weighbridge.kernels.rotation import euler_to_matrix
 from weighbridge.navigation.select import find_motion
-from weighbridge.signals import Signal
-from weighbridge.signals.alignment import align
+from weighbridge.signals import Signal, align
 from weighbridge.vehicle.gear import detect_gearings
 from weighbridge.vehicle.power_balance import find_power_balance
 from weighbridge.vehicle.torque_sources import TORQUE_SOURCES

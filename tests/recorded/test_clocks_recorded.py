@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from weighbridge import Signal, read_drive
-from weighbridge.signals.alignment import align
+from weighbridge.signals import align
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 MOVED = 1234.5

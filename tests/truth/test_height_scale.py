@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from weighbridge import Vehicle
-from weighbridge.balance import ForceBalance, ForceTable
-from weighbridge.balance.height_scale import height_scale
+from weighbridge.balance import ForceBalance, ForceTable, height_scale
 from weighbridge.constants import GRAVITY
 from weighbridge.vehicle import Driveline, RoadLoad
 

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from weighbridge import Signal, read_drive
 from weighbridge.constants import EARTH_RADIUS
-from weighbridge.signals.alignment import align
+from weighbridge.signals import align
 
 
 def road_speed(time, seed=0):

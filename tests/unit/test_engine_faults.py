@@ -13,9 +13,8 @@ from tests.noted import noted, refused, says
 import weighbridge as wb
 from weighbridge import Drive, Signal, Status, Vehicle
 from weighbridge.checks import check_drive, correct_drive
-from weighbridge.estimators import ESTIMATORS
+from weighbridge.estimators import ESTIMATORS, contradicted
 from weighbridge.estimators.joint import changing
-from weighbridge.estimators.joint.contradicted import contradicted
 from weighbridge.navigation import without_accelerometer
 from weighbridge.pipeline.weighing import weigh_balance
 from weighbridge.signals import QUANTITIES

@@ -14,7 +14,7 @@ from tests.ports import free_ports
 
 from weighbridge import ConfigError, Drive, DriveError, Signal
 from weighbridge.errors import SourceError
-from weighbridge.io.nmea import read_sentence
+from weighbridge.io import read_sentence
 from weighbridge.io.obd import LENGTHS, PIDS, bytes_of, parameters_of, values_of
 from weighbridge.live import Feed, Played, clock, devices, parse_source
 from weighbridge.live.emulator.lines import InertialLines

@@ -10,7 +10,7 @@ from threading import Event, Thread
 import pytest
 
 from weighbridge import ConfigError
-from weighbridge.io.nmea import UnfitSentenceError, read_sentence
+from weighbridge.io import UnfitSentenceError, read_sentence
 from weighbridge.live import Feed, parse_source
 from weighbridge.live.sources.nmea import SentenceReader
 

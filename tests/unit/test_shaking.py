@@ -8,7 +8,7 @@ from numba import config
 from scipy.signal import lfilter
 
 from weighbridge import Signal
-from weighbridge.balance.shaking import shaken
+from weighbridge.balance import shaken
 from weighbridge.checks import correct_drive
 from weighbridge.navigation import find_motion
 from weighbridge.simulation import Sensors, make_scenario, simulate_car

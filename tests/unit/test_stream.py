@@ -8,11 +8,10 @@ from numpy.testing import assert_allclose, assert_array_equal
 from tests.unit.test_j1939 import frames
 
 from weighbridge import ConfigError
-from weighbridge.io import load_dbcs, load_mapping
+from weighbridge.io import DbcStream, J1939Stream, ObdStream, load_dbcs, load_mapping
 from weighbridge.io.bus import decode
 from weighbridge.io.frame_text import read_candump
 from weighbridge.io.j1939 import SPNS, decode_j1939
-from weighbridge.io.stream import DbcStream, J1939Stream, ObdStream
 
 GOLDEN = Path(__file__).parents[1] / "golden"
 MAPPING = {

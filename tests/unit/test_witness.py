@@ -9,7 +9,7 @@ from tests.noted import error, refused
 
 import weighbridge as wb
 from weighbridge import Drive, DriveInfo, Signal, Vehicle
-from weighbridge.balance.second_signal_learning import learn_second_signals
+from weighbridge.balance import learn_second_signals
 from weighbridge.checks import check_drive
 from weighbridge.estimators import ESTIMATORS
 from weighbridge.messages import phrase

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from weighbridge.balance import ForceBalance, Reason
-from weighbridge.balance.delay import best_delay, delay_std
+from weighbridge.balance import ForceBalance, Reason, best_delay
+from weighbridge.balance.delay import delay_std
 from weighbridge.balance.law import ROAD_PARAMETERS
 from weighbridge.calibration.fitted import (
     Fitted,

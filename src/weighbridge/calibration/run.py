@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from weighbridge.arguments import check_type
-from weighbridge.balance import ForceBalance
-from weighbridge.balance.second_signal_learning import learn_second_signals
+from weighbridge.balance import ForceBalance, learn_second_signals
 from weighbridge.calibration.charge import in_their_air
 from weighbridge.calibration.fitted import Fitted, fitted_rows, noted, rebalanced
 from weighbridge.calibration.joint import fit_joint, fit_speed_torque

@@ -19,6 +19,7 @@ from weighbridge.estimators import (
     speed_torque_ekf,
     vahidi,
 )
+from weighbridge.estimators.joint.contradicted import contradicted
 from weighbridge.estimators.settings import changed, differences, parsed
 from weighbridge.estimators.track import MassTrack, Segment, Status
 from weighbridge.registry import Registry
@@ -172,6 +173,7 @@ __all__ = [
     "Segment",
     "Status",
     "changed",
+    "contradicted",
     "differences",
     "parsed",
 ]

@@ -7,17 +7,25 @@ from weighbridge.io.format import Format, Takes
 from weighbridge.io.formats import FORMATS, format_of, formats, is_log
 from weighbridge.io.mapping import load_mapping
 from weighbridge.io.mapping_text import mapping_text
+from weighbridge.io.nmea import Sentence, UnfitSentenceError, read_sentence
 from weighbridge.io.quiet import PARSE_ERRORS, first_line, quietly
 from weighbridge.io.read import read_drive, read_drives, read_table
 from weighbridge.io.read_frames import read_frame
+from weighbridge.io.stream import DbcStream, J1939Stream, ObdStream, Stream
 from weighbridge.io.write import to_frames, write_drive, write_mdf, write_table
 
 __all__ = [
     "FORMATS",
     "PARSE_ERRORS",
+    "DbcStream",
     "Draft",
     "Format",
+    "J1939Stream",
+    "ObdStream",
+    "Sentence",
+    "Stream",
     "Takes",
+    "UnfitSentenceError",
     "draft",
     "draft_bus",
     "first_line",
@@ -31,6 +39,7 @@ __all__ = [
     "read_drive",
     "read_drives",
     "read_frame",
+    "read_sentence",
     "read_table",
     "to_frames",
     "write_drive",

@@ -13,8 +13,7 @@ from weighbridge.constants import EARTH_RADIUS
 from weighbridge.errors import DriveError
 from weighbridge.io.log import Log
 from weighbridge.messages import phrase, refused
-from weighbridge.signals import Bools, Floats, Problem, Signal
-from weighbridge.signals.alignment import Alignment, align
+from weighbridge.signals import Alignment, Bools, Floats, Problem, Signal, align
 
 _Signals = Mapping[str, Signal]
 

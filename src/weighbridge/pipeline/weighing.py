@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from weighbridge.arguments import check_flag, check_path, check_text, check_type, suggestion
-from weighbridge.balance import ForceBalance, force_balance
+from weighbridge.balance import ForceBalance, force_balance, height_scale, shaken
 from weighbridge.balance.bandwidth import smoothed_torque
 from weighbridge.balance.charge import in_this_air
 from weighbridge.balance.circumference import on_its_tyres
@@ -21,17 +21,14 @@ from weighbridge.balance.delay import (
 )
 from weighbridge.balance.gear_fit import ENOUGH, ratio_apart, share_on_gears
 from weighbridge.balance.gear_scale import scale_contradiction
-from weighbridge.balance.height_scale import height_scale
 from weighbridge.balance.hybrid import motor_helps
-from weighbridge.balance.shaking import shaken
 from weighbridge.balance.speed_balance import speed_balance
 from weighbridge.balance.torque_drift import smoothed_steps
 from weighbridge.errors import ConfigError, DriveError, WeighbridgeError
-from weighbridge.estimators import ESTIMATORS, MassTrack, Status, differences, joint
+from weighbridge.estimators import ESTIMATORS, MassTrack, Status, contradicted, differences, joint
 from weighbridge.estimators.gate import GATE
 from weighbridge.estimators.joint.bend import bent
 from weighbridge.estimators.joint.changing import largest
-from weighbridge.estimators.joint.contradicted import contradicted
 from weighbridge.estimators.joint.foreign import of_another
 from weighbridge.estimators.joint.slow_errors import motion_variance, with_variance
 from weighbridge.estimators.judging import lacks_accelerometer

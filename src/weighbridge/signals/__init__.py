@@ -1,6 +1,7 @@
 """Signals, drives and their units: the words everything else is said in."""
 
 from weighbridge.messages import Problem
+from weighbridge.signals.alignment import Alignment, align
 from weighbridge.signals.catalogue import QUANTITIES, Quantity
 from weighbridge.signals.drive import Drive, DriveInfo
 from weighbridge.signals.recent import BEHIND, LONGEST_STEP, STEP, STEPS, recent, step_ends
@@ -31,6 +32,7 @@ __all__ = [
     "STEP",
     "STEPS",
     "UNITS",
+    "Alignment",
     "Bools",
     "Drive",
     "DriveInfo",
@@ -40,6 +42,7 @@ __all__ = [
     "Quantity",
     "Signal",
     "Unit",
+    "align",
     "from_si",
     "huber",
     "median_of_three",

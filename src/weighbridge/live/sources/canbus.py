@@ -11,10 +11,9 @@ from typing import Any, Final
 import numpy as np
 
 from weighbridge.errors import ConfigError, MissingExtraError, SourceError
-from weighbridge.io import load_dbcs, load_mapping
+from weighbridge.io import DbcStream, J1939Stream, ObdStream, Stream, load_dbcs, load_mapping
 from weighbridge.io.frames import Frames
 from weighbridge.io.mapping import TableMapping, named_dbcs
-from weighbridge.io.stream import DbcStream, J1939Stream, ObdStream, Stream
 from weighbridge.live.clock import now
 from weighbridge.live.device_clock import DeviceClock
 from weighbridge.live.source import Samples

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from weighbridge.io.nmea import SENTENCE, Sentence, UnfitSentenceError, read_sentence
+from weighbridge.io import Sentence, UnfitSentenceError, read_sentence
+from weighbridge.io.nmea import SENTENCE
 from weighbridge.live.device_clock import DeviceClock
 from weighbridge.live.sources.kind import SourceOptions
 from weighbridge.live.sources.links import serial_or_tcp
