@@ -18,10 +18,11 @@ from weighbridge.papers.jensen2022_drives import (
     HIGHWAY_TRIPS,
     TABLE_B1,
     Conditions,
+    gradient_road,
+    gradient_scenario,
     highway_scenario,
     scenario,
 )
-from weighbridge.papers.jensen2022_gradient import gradient_road, gradient_scenario
 from weighbridge.papers.jensen2022_judged import joined, torques
 from weighbridge.papers.jensen2022_printed import train
 from weighbridge.papers.jensen2022_tables import (

@@ -13,8 +13,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from tests.noted import error
 
 from weighbridge import DriveError, DriveInfo, read_drive
-from weighbridge.io import read_table, write_drive
-from weighbridge.io.parts import join_parts, part_files
+from weighbridge.io import join_parts, read_table, write_drive
 from weighbridge.live import Recorder, Recordings
 
 BEGIN = 1_790_000_000.25
@@ -49,6 +48,11 @@ def record(folder, seconds, clock, **kwargs):
     return recorder
 
 
+def parts(folder):
+    """Parts of the inertial table of a recording, oldest first."""
+    return sorted((folder / "drive" / "imu.parts").glob("*.parquet"))
+
+
 def assert_holds(drive, seconds):
     """The signals of ``seconds``, as far as they go."""
     for name in ("accel_x", "vehicle_speed", "engine_speed"):
@@ -80,7 +84,7 @@ def test_a_recording_is_a_canonical_drive(tmp_path):
 def test_parts_are_written_on_the_way_and_read_as_a_drive(tmp_path):
     recorder = record(tmp_path / "drive", 100, Clock())
     recorder._writer.submit(int).result()
-    assert len(part_files(tmp_path / "drive" / "imu.parts")) == 3
+    assert len(parts(tmp_path)) == 3
     drive = read_drive(tmp_path / "drive")
     assert_holds(drive, 100)
     assert drive.duration > 85.0
@@ -322,7 +326,7 @@ def test_a_recording_killed_while_it_writes_is_read(tmp_path, pytestconfig, afte
 def test_a_part_that_is_no_table_is_left_out_and_told(tmp_path):
     recorder = record(tmp_path / "drive", 100, Clock())
     recorder._writer.submit(int).result()
-    part_files(tmp_path / "drive" / "imu.parts")[1].write_bytes(b"PAR1 torn")
+    parts(tmp_path)[1].write_bytes(b"PAR1 torn")
     drive = read_drive(tmp_path / "drive")
     assert any(
         p.id == "file.part_damaged" and p.values["part"] == "000002.parquet" for p in drive.problems
@@ -347,7 +351,7 @@ def test_tables_joined_before_the_process_was_killed_are_read_once(tmp_path):
     recorder = record(tmp_path / "drive", 100, Clock())
     recorder._flush()
     recorder._writer.submit(int).result()
-    kept = [(p, p.read_bytes()) for p in part_files(tmp_path / "drive" / "imu.parts")]
+    kept = [(p, p.read_bytes()) for p in parts(tmp_path)]
     join_parts(tmp_path / "drive", "imu")
     for path, data in kept:
         path.parent.mkdir(exist_ok=True)

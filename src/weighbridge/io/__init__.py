@@ -8,6 +8,7 @@ from weighbridge.io.formats import FORMATS, format_of, formats, is_log
 from weighbridge.io.mapping import load_mapping
 from weighbridge.io.mapping_text import mapping_text
 from weighbridge.io.nmea import Sentence, UnfitSentenceError, read_sentence
+from weighbridge.io.parts import join_parts
 from weighbridge.io.quiet import PARSE_ERRORS, first_line, quietly
 from weighbridge.io.read import read_drive, read_drives, read_table
 from weighbridge.io.read_frames import read_frame
@@ -32,6 +33,7 @@ __all__ = [
     "format_of",
     "formats",
     "is_log",
+    "join_parts",
     "load_dbcs",
     "load_mapping",
     "mapping_text",

@@ -15,10 +15,10 @@ from typing import Final
 import numpy as np
 
 from weighbridge.errors import DriveError, WeighbridgeError
-from weighbridge.io import PARSE_ERRORS
+from weighbridge.io import PARSE_ERRORS, join_parts
 from weighbridge.io.info import FILE_NAME as INFO_NAME
 from weighbridge.io.info import info_text
-from weighbridge.io.parts import join_parts, part_path
+from weighbridge.io.parts import part_path
 from weighbridge.io.table import DATES, start_text
 from weighbridge.io.write import to_frames, write_frame
 from weighbridge.live.source import Samples

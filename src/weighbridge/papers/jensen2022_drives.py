@@ -1,19 +1,24 @@
-"""The drives of Jensen et al. 2022 for the simulator: Table B.1 and the highway of sec. 7.5."""
+"""The drives of Jensen et al. 2022 for the simulator: Table B.1, the roads of sec. 7.2 and 7.5."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
 from weighbridge.errors import ConfigError
 from weighbridge.signals import Drive, scalar_from_si, scalar_to_si
-from weighbridge.simulation import Effects, make_scenario
-
-if TYPE_CHECKING:
-    from weighbridge.simulation import Scenario
+from weighbridge.simulation import (
+    MIDSIZE,
+    Braking,
+    Effects,
+    Route,
+    Scenario,
+    flat_route,
+    make_scenario,
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -244,6 +249,51 @@ def highway_scenario(
         wind_from=trip.wind_from,
     )
     return conditions.of(chosen)
+
+
+GRADIENT_LENGTH: Final = 600.0
+"""Of the road [m] (sec. 7.2)."""
+
+INCLINES: Final = ((120.0, 200.0, 0.06), (430.0, 520.0, -0.05))
+"""Where each begins and ends [m], and its slope [rad]: chosen, the paper draws them."""
+
+TURNS: Final = ((260.0, 0.5 * math.pi), (395.0, -0.5 * math.pi))
+"""Middle [m] and angle [rad]; the second incline lies after a turn."""
+
+TURN_RADIUS: Final = 15.0
+"""Of the turns, chosen [m]."""
+
+GRADIENT_LIMIT: Final = scalar_to_si(35.0, "kmh")
+"""Speed held on the straight parts, chosen."""
+
+BRAKINGS: Final = tuple(Braking(time=t, duration=2.0, decel=2.0) for t in (45.0, 58.0, 71.0, 84.0))
+"""Of run 2, which accelerates and brakes again and again; the drive begins after 25 s at rest."""
+
+
+def gradient_road() -> Route:
+    """Return the road; what the paper does not state of it is chosen."""
+    road = flat_route(GRADIENT_LENGTH, limit=GRADIENT_LIMIT)
+    at = np.arange(road.grade.size, dtype=np.float64)
+    grade, curvature = np.zeros(at.size), np.zeros(at.size)
+    for begin, end, slope in INCLINES:
+        # A ramp of 15 m: no wheel meets a kink.
+        rise = np.clip((at - begin) / 15.0, 0.0, 1.0) * np.clip((end - at) / 15.0, 0.0, 1.0)
+        grade += slope * rise
+    for middle, angle in TURNS:
+        length = 2.0 * abs(angle) * TURN_RADIUS
+        inside = np.abs(at - middle) < 0.5 * length
+        shape = np.where(inside, np.cos(math.pi * (at - middle) / length) ** 2, 0.0)
+        curvature += angle * shape / shape.sum()
+    return replace(road, name="600 m, two inclines", grade=grade, heading=np.cumsum(curvature))
+
+
+def gradient_scenario(run: int, seed: int, conditions: Conditions = CONDITIONS) -> Scenario:
+    """Make one of the three runs: 1 and 3 almost at constant speed, 2 with strong accelerations."""
+    made = Scenario(name=f"slope, run {run}", car=MIDSIZE, route=gradient_road(), seed=seed)
+    calm = replace(made, effects=made.effects.without("traffic"))
+    if run != 2:
+        return conditions.of(replace(calm, aggressiveness=0.5))
+    return conditions.of(replace(calm, aggressiveness=1.5, brakings=BRAKINGS))
 
 
 def without_weather(drive: Drive) -> Drive:

@@ -12,9 +12,8 @@ from typing import Any, Final
 
 from weighbridge.errors import SourceError
 from weighbridge.live.emulator.adapter import Elm327
-from weighbridge.live.emulator.lines import InertialLines
 from weighbridge.live.emulator.played import Played
-from weighbridge.live.emulator.sentences import Sentences
+from weighbridge.live.emulator.sent import InertialLines, Sentences
 from weighbridge.signals.catalogue import IMU_SIGNALS
 
 HOST: Final = "127.0.0.1"
