@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from weighbridge.io import join_messages
 from weighbridge.io.frames import Frames, bits, join_frames, settle_clock
-from weighbridge.io.isotp import assemble
 
 
 def make(time, identifier=0x100, data=None, channel=1, extended=False, width=8):
@@ -82,7 +82,7 @@ def test_long_messages_are_put_together_whatever_their_length():
     rng = np.random.default_rng(3)
     messages = [bytes(rng.integers(0, 256, n, dtype=np.uint8)) for n in (8, 13, 14, 20, 150, 255)]
     parts = [p for m in messages for p in split(m)]
-    got = assemble(make(0.01 * np.arange(len(parts)), data=parts))
+    got = join_messages(make(0.01 * np.arange(len(parts)), data=parts))
     assert got.broken == 0
     assert [bytes(d[:n]) for d, n in zip(got.data, got.length, strict=True)] == messages
 
@@ -90,9 +90,9 @@ def test_long_messages_are_put_together_whatever_their_length():
 def test_long_messages_of_can_fd():
     message = bytes(range(1, 151))
     parts = split(message, first=62, size=63)
-    got = assemble(make(0.01 * np.arange(len(parts)), data=parts, width=64))
+    got = join_messages(make(0.01 * np.arange(len(parts)), data=parts, width=64))
     assert bytes(got.data[0, : got.length[0]]) == message
-    single = assemble(make([0.0], data=[bytes([0, 20]) + bytes(range(20))], width=64))
+    single = join_messages(make([0.0], data=[bytes([0, 20]) + bytes(range(20))], width=64))
     assert bytes(single.data[0, : single.length[0]]) == bytes(range(20))
 
 
@@ -104,14 +104,14 @@ def test_messages_with_parts_missing_are_counted_not_guessed():
     parts = [*lost, *whole, *swapped, *late]
     time = 0.01 * np.arange(len(parts))
     time[-2:] += 5.0
-    got = assemble(make(time, data=parts))
+    got = join_messages(make(time, data=parts))
     assert got.broken == 3
     assert_allclose(got.time, [0.04])
     assert bytes(got.data[0, :30]) == bytes(range(100, 130))
 
 
 def test_single_frames_that_claim_more_than_they_hold_are_left_out():
-    got = assemble(make([0.0, 1.0], data=[b"\x07\x41\x0c", b"\x02\x41\x0c"]))
+    got = join_messages(make([0.0, 1.0], data=[b"\x07\x41\x0c", b"\x02\x41\x0c"]))
     assert_array_equal(got.length, [2])
     assert_array_equal(got.time, [1.0])
 

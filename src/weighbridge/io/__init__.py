@@ -5,6 +5,7 @@ from weighbridge.io.dbc import load_dbcs
 from weighbridge.io.draft import Draft, draft
 from weighbridge.io.format import Format, Takes
 from weighbridge.io.formats import FORMATS, format_of, formats, is_log
+from weighbridge.io.isotp import join_messages
 from weighbridge.io.mapping import load_mapping
 from weighbridge.io.mapping_text import mapping_text
 from weighbridge.io.nmea import Sentence, UnfitSentenceError, read_sentence
@@ -33,6 +34,7 @@ __all__ = [
     "format_of",
     "formats",
     "is_log",
+    "join_messages",
     "join_parts",
     "load_dbcs",
     "load_mapping",

@@ -41,7 +41,7 @@ class Messages:
     frames: int
 
 
-def assemble(frames: Frames) -> Messages:
+def join_messages(frames: Frames) -> Messages:
     """Put the messages of one sender together.
 
     A message is kept only where all its frames are there, in the order of

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from weighbridge.io.frames import Frames, bits
-from weighbridge.io.isotp import Messages, assemble
+from weighbridge.io.isotp import Messages, join_messages
 from weighbridge.signals import Bools, Floats, Problem, Signal, scalar_from_si, scalar_to_si, to_si
 from weighbridge.signals.cleaning import clean_signal
 from weighbridge.signals.words import counted
@@ -248,7 +248,7 @@ def decode_obd(frames: Frames, name: str = "OBD-II") -> Obd:
             & (frames.id == identifier)
             & (frames.extended == extended)
         )
-        messages = assemble(frames.select(which))
+        messages = join_messages(frames.select(which))
         sender = _Sender(f"CAN {channel} {identifier:X}")
         _read_messages(messages, sender)
         if messages.broken:

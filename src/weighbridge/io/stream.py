@@ -17,7 +17,7 @@ from weighbridge.errors import ConfigError
 from weighbridge.io.bus import Decoded, Wanted, canonical_signals, mapped_signals, valid_values
 from weighbridge.io.dbc import Database, Found, message_frames, physical
 from weighbridge.io.frames import Frames, in_order
-from weighbridge.io.isotp import assemble
+from weighbridge.io.isotp import join_messages
 from weighbridge.io.j1939 import (
     EC1,
     FRICTION_AGE,
@@ -199,7 +199,7 @@ class ObdStream:
             return {}
         rows: dict[str, list[tuple[float, float]]] = {}
         for sender in np.unique(self._waiting.id).tolist():
-            messages = assemble(self._waiting.select(self._waiting.id == sender))
+            messages = join_messages(self._waiting.select(self._waiting.id == sender))
             new = np.flatnonzero(messages.time > self._done.get(sender, -np.inf))
             for k in new.tolist():
                 time = float(messages.time[k])

@@ -12,8 +12,8 @@ from typing import Final
 
 import numpy as np
 
+from weighbridge.io import join_messages
 from weighbridge.io.frames import Frames
-from weighbridge.io.isotp import assemble
 
 TROUBLES: Final = (
     "NO DATA", "UNABLE TO CONNECT", "STOPPED", "BUS ERROR", "CAN ERROR", "BUS BUSY", "DATA ERROR",
@@ -138,7 +138,7 @@ def _add_frames(frames: Sequence[tuple[int, bool, bytes]], reply: Reply) -> None
         table = np.zeros((len(mine), 8), np.uint8)
         for row, (_, data) in zip(table, mine, strict=True):
             row[: len(data)] = np.frombuffer(data, np.uint8)
-        messages = assemble(
+        messages = join_messages(
             Frames(
                 1e-3 * np.arange(len(mine), dtype=np.float64),
                 np.zeros(len(mine), np.int16),
