@@ -4,7 +4,7 @@ import numpy as np
 
 from weighbridge.io import Format, Takes
 from weighbridge.io.log import Log
-from weighbridge.signals.cleaning import clean_columns
+from weighbridge.signals import clean_columns
 
 
 def read(path, table, mapping):

@@ -11,7 +11,7 @@ from tests.unit.test_checks import CAR, GNSS, make_drive, shifted
 from weighbridge import Drive, Signal, inspect_drive, read_drive
 from weighbridge.checks import check_drive, correct_drive
 from weighbridge.io import write_drive
-from weighbridge.signals.cleaning import clean_columns
+from weighbridge.signals import clean_columns
 
 IMU = tuple(f"{kind}_{a}" for kind in ("accel", "gyro") for a in "xyz")
 OBD = ("vehicle_speed", "engine_speed", "engine_load")

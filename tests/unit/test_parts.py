@@ -10,10 +10,16 @@ import weighbridge as wb
 from weighbridge import Signal, read_drives
 from weighbridge.checks import check_drive, correct_drive
 from weighbridge.io import write_table
-from weighbridge.signals.parts import KEPT, PAUSE, STANDING, find_cuts, find_splices, parted
+from weighbridge.signals import find_splices, parted
 from weighbridge.simulation import make_scenario, simulate_car
 
 LONG = 400.0
+
+PAUSE, STANDING = 300.0, 600.0
+"""Where nothing is recorded, or the vehicle means, so long a drive ends [s]."""
+
+KEPT = 60.0
+"""So much of such a stop the drives to both sides keep [s]."""
 
 
 @pytest.fixture(scope="module")
@@ -54,7 +60,7 @@ def test_pauses_part_a_day(trips):
         assert part.problems[-1].values["parts"] == 3
         assert part.problems[-1].text.endswith(f"{part.start:.0f} to {part.end:.0f} s")
     assert parted(parts[0])[0] is parts[0]
-    assert not find_cuts(behind(trips, PAUSE - 60.0))
+    assert len(parted(behind(trips, PAUSE - 60.0))) == 1
 
 
 def test_a_position_held_through_a_tunnel_is_no_splice(trips):
@@ -101,7 +107,7 @@ def test_a_clock_set_while_moving_on_parts_nothing(trips):
         Signal(s.name, np.where(s.time > at, s.time + 7200.0, s.time), s.values)
         for s in trip.signals.values()
     ]
-    assert not find_cuts(trip.with_signals(*later))
+    assert len(parted(trip.with_signals(*later))) == 1
 
 
 def test_a_splice_on_one_clock_is_found(trips):

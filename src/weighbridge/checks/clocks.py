@@ -11,11 +11,9 @@ import numpy as np
 from weighbridge.constants import EARTH_RADIUS
 from weighbridge.messages import phrase
 from weighbridge.navigation.aiding import SLOWEST
-from weighbridge.signals import QUANTITIES, Drive, Floats, Problem, Signal
+from weighbridge.signals import NO_DRIVE, QUANTITIES, Drive, Floats, Problem, Signal, find_splices
 from weighbridge.signals.catalogue import IMU_SIGNALS, TABLES
-from weighbridge.signals.cleaning import NO_DRIVE
 from weighbridge.signals.instants import instant, span
-from weighbridge.signals.parts import find_splices
 from weighbridge.vehicle import Vehicle
 
 # An inertial sensor with so much between its samples is slow, not in milliseconds [s], where it

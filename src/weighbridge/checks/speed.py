@@ -14,9 +14,8 @@ import numpy as np
 
 from weighbridge.checks import windows
 from weighbridge.messages import phrase
-from weighbridge.signals import UNITS, Drive, Floats, Problem, Signal
+from weighbridge.signals import UNITS, Drive, Floats, Problem, Signal, find_splices
 from weighbridge.signals.instants import instant
-from weighbridge.signals.parts import find_splices
 from weighbridge.vehicle import Vehicle
 from weighbridge.vehicle.classes import FASTEST, STRONGEST
 

@@ -25,8 +25,7 @@ from weighbridge.io.j1939 import decode_j1939, is_j1939
 from weighbridge.io.mapping import MappedSignal, TableMapping, lacking, resolved_unit
 from weighbridge.io.obd import decode_obd
 from weighbridge.messages import phrase
-from weighbridge.signals import Bools, Floats, Problem, Signal, to_si
-from weighbridge.signals.cleaning import clean_columns
+from weighbridge.signals import Bools, Floats, Problem, Signal, clean_columns, to_si
 from weighbridge.signals.tomlfile import Faults
 from weighbridge.signals.words import counted
 

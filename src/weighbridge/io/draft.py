@@ -42,9 +42,7 @@ from weighbridge.io.table import (
     head,
     read_text,
 )
-from weighbridge.signals import QUANTITIES, UNITS, Floats, to_si
-from weighbridge.signals.cleaning import spread_rows
-from weighbridge.signals.parts import find_restarts
+from weighbridge.signals import QUANTITIES, UNITS, Floats, find_restarts, spread_rows, to_si
 from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
 
 _STRANGE_UNIT: Final = re.compile(

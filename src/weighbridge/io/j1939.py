@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 
 from weighbridge.io.frames import Frames, bits
 from weighbridge.io.j1939_transport import assemble
-from weighbridge.signals import Bools, Floats, Problem, Signal, to_si
-from weighbridge.signals.cleaning import clean_signal
+from weighbridge.signals import Bools, Floats, Problem, Signal, clean_signal, to_si
 from weighbridge.signals.words import counted
 
 EEC1, EEC2, EEC3 = 0xF004, 0xF003, 0xFEDF

@@ -9,8 +9,7 @@ from pathlib import Path
 
 from weighbridge.io.frames import Frames
 from weighbridge.io.mapping import TableMapping
-from weighbridge.signals import DriveInfo, Floats, Problem, Signal
-from weighbridge.signals.cleaning import clean_columns
+from weighbridge.signals import DriveInfo, Floats, Problem, Signal, clean_columns
 
 
 @dataclass(slots=True)

@@ -16,8 +16,16 @@ from numpy.typing import NDArray
 
 from weighbridge.io.frames import Frames, bits
 from weighbridge.io.isotp import Messages, join_messages
-from weighbridge.signals import Bools, Floats, Problem, Signal, scalar_from_si, scalar_to_si, to_si
-from weighbridge.signals.cleaning import clean_signal
+from weighbridge.signals import (
+    Bools,
+    Floats,
+    Problem,
+    Signal,
+    clean_signal,
+    scalar_from_si,
+    scalar_to_si,
+    to_si,
+)
 from weighbridge.signals.words import counted
 
 SOURCE: Final = "SAE J1979"

@@ -41,10 +41,18 @@ from weighbridge.io.paths import given_paths, is_folder
 from weighbridge.io.quiet import PARSE_ERRORS, first_line
 from weighbridge.io.repeats import joined_signal, settle_repeats
 from weighbridge.io.table import read_text, start_text
-from weighbridge.signals import QUANTITIES, Drive, DriveInfo, Floats, Problem, Signal
+from weighbridge.signals import (
+    NO_DRIVE,
+    QUANTITIES,
+    Drive,
+    DriveInfo,
+    Floats,
+    Problem,
+    Signal,
+    numbered,
+    parted,
+)
 from weighbridge.signals.catalogue import TABLES
-from weighbridge.signals.cleaning import NO_DRIVE
-from weighbridge.signals.parts import numbered, parted
 from weighbridge.visible import visible
 from weighbridge.whole import REPLACING
 

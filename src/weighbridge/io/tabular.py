@@ -41,9 +41,8 @@ from weighbridge.io.table import (
     read_text,
     time_seconds,
 )
-from weighbridge.signals import QUANTITIES, UNITS, Floats, Problem
+from weighbridge.signals import QUANTITIES, UNITS, Floats, Problem, find_restarts
 from weighbridge.signals.catalogue import TIME_COLUMN
-from weighbridge.signals.parts import find_restarts
 from weighbridge.signals.tomlfile import Faults
 
 _PARTED: Final = re.compile(f"[{re.escape(''.join(SEPARATORS))}]")

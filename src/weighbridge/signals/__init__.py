@@ -3,7 +3,9 @@
 from weighbridge.messages import Problem
 from weighbridge.signals.alignment import Alignment, align
 from weighbridge.signals.catalogue import QUANTITIES, Quantity
+from weighbridge.signals.cleaning import NO_DRIVE, clean_columns, clean_signal, spread_rows
 from weighbridge.signals.drive import Drive, DriveInfo
+from weighbridge.signals.parts import find_restarts, find_splices, numbered, parted
 from weighbridge.signals.recent import BEHIND, LONGEST_STEP, STEP, STEPS, recent, step_ends
 from weighbridge.signals.robust import (
     huber,
@@ -28,6 +30,7 @@ from weighbridge.signals.units import (
 __all__ = [
     "BEHIND",
     "LONGEST_STEP",
+    "NO_DRIVE",
     "QUANTITIES",
     "STEP",
     "STEPS",
@@ -43,10 +46,16 @@ __all__ = [
     "Signal",
     "Unit",
     "align",
+    "clean_columns",
+    "clean_signal",
+    "find_restarts",
+    "find_splices",
     "from_si",
     "huber",
     "median_of_three",
     "median_slope",
+    "numbered",
+    "parted",
     "recent",
     "resolution",
     "robust_fit",
@@ -54,6 +63,7 @@ __all__ = [
     "scalar_from_si",
     "scalar_to_si",
     "spread",
+    "spread_rows",
     "step_ends",
     "to_si",
     "unit",
