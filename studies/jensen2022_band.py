@@ -19,7 +19,8 @@ import numpy as np
 
 from weighbridge.calibration.run import run_calibration
 from weighbridge.calibration.settings import CalibrationSettings
-from weighbridge.estimators.rls import RlsSettings, estimate
+from weighbridge.estimators import RlsSettings
+from weighbridge.estimators.rls import estimate
 from weighbridge.estimators.track import MassTrack
 from weighbridge.navigation.printed import PrintedFilterSettings
 from weighbridge.papers.jensen2022_drives import (

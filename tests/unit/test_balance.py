@@ -10,7 +10,7 @@ from tests.noted import refused
 from weighbridge import Drive, DriveInfo, Signal, Vehicle
 from weighbridge.balance import Reason, force_balance
 from weighbridge.balance.law import drag_force, rotating_mass
-from weighbridge.estimators.rls import estimate
+from weighbridge.estimators import ESTIMATORS
 from weighbridge.navigation import Motion
 from weighbridge.vehicle import Driveline, RoadLoad, Timing, TorqueModel
 
@@ -263,7 +263,7 @@ def weighable():
 
 
 def test_weighing_takes_rising_speed_only():
-    track = estimate(force_balance(drive(torque=weighable()), CAR, motion()), CAR)
+    track = ESTIMATORS["rls"].track(force_balance(drive(torque=weighable()), CAR, motion()), CAR)
     assert track.mass == pytest.approx(MASS, rel=1e-3)
     falling = track.balance.table.accel <= 0.0
     assert np.isin(track.row_reason[falling], (Reason.NOT_ACCELERATING, Reason.OVERRUN)).all()
@@ -274,7 +274,7 @@ def test_an_outlier_is_a_bad_fit():
     rising = np.flatnonzero((accel_at(STAMPS) > 0.3) & (STAMPS > 300.0))[5]
     torque = weighable() + np.random.default_rng(1).normal(scale=0.5, size=STAMPS.size)
     torque[rising] += 400.0
-    track = estimate(force_balance(drive(torque=torque), CAR, motion()), CAR)
+    track = ESTIMATORS["rls"].track(force_balance(drive(torque=torque), CAR, motion()), CAR)
     # So sharp a fall behind it may be a foot that leaves the accelerator as well.
     assert track.row_reason[rising] in (Reason.BAD_FIT, Reason.OVERRUN)
     assert track.mass == pytest.approx(MASS, rel=0.01)

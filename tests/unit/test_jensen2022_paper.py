@@ -11,7 +11,7 @@ from tests.noted import error
 
 from weighbridge import ConfigError
 from weighbridge.calibration import TABLE_5
-from weighbridge.estimators.rls import RlsSettings, estimate, run_in_turn
+from weighbridge.estimators import ESTIMATORS, RlsSettings, run_in_turn
 from weighbridge.papers import document, jensen2022, seed_of, settings_of
 from weighbridge.papers.jensen2022_drives import (
     HIGHWAY_LIMIT,
@@ -86,7 +86,7 @@ def test_the_road_of_fig_5_is_600_m_with_two_inclines_and_two_right_angles():
 
 def test_drives_in_turn_are_one_long_drive(car):
     balance = car.balance
-    alone = estimate(balance, car.vehicle).running_mass
+    alone = ESTIMATORS["rls"].track(balance, car.vehicle).running_mass
     first, second = run_in_turn([balance, balance], car.vehicle)
     known = np.isfinite(alone)
     assert_allclose(first[known], alone[known], rtol=1e-12)

@@ -1,6 +1,7 @@
 """The paper's own rules of Jensen et al. 2022: filter, fit and recursive least squares."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from weighbridge import ConfigError, DriveError, weigh
 from weighbridge.balance import Reason
 from weighbridge.balance.law import force_on_mass, mass_column
 from weighbridge.calibration import TABLE_5
-from weighbridge.estimators.rls import RlsSettings, parameters
+from weighbridge.estimators import ESTIMATORS, RlsSettings
 from weighbridge.kernels import ins_printed as kernel
 from weighbridge.kernels import rls
 from weighbridge.kernels.rotation import euler_to_quaternion
@@ -155,15 +156,39 @@ def test_a_users_drive_is_weighed_as_printed(made, car):
 
 @pytest.mark.parametrize("guarded", [False, True])
 def test_the_guard_keeps_the_gain_at_its_start_where_nothing_is_learnt(guarded):
-    settings = RlsSettings(wind_up_guard=guarded, forgetting=0.99, gate=math.inf)
-    n = 1000
+    n, gain = 1000, 0.01
     still = np.zeros((n, 1))
-    start = rls.initial_state([1500.0], [[settings.initial_gain]])
-    after, *_ = rls.run(
-        start, np.arange(n) * 0.25, still, still[:, 0], np.ones(n, bool), parameters(settings, 0.25)
+    params = rls.RlsParams(
+        forgetting=0.99,
+        cov_limit=np.array([gain if guarded else np.inf]),
+        gate=math.inf,
+        scale_rows=400.0,
+        settle_rows=0,
+        block=60.0,
     )
-    expected = settings.initial_gain * (1.0 if guarded else 0.99**-n)
-    assert_allclose(after.cov, [[expected]], rtol=1e-6)
+    start = rls.initial_state([1500.0], [[gain]])
+    after, *_ = rls.run(start, np.arange(n) * 0.25, still, still[:, 0], np.ones(n, bool), params)
+    assert_allclose(after.cov, [[gain * (1.0 if guarded else 0.99**-n)]], rtol=1e-6)
+
+
+def test_without_the_guard_rows_after_others_that_tell_nothing_weigh_more(car):
+    balance, fit = car.balance, ESTIMATORS["rls"]
+    table = balance.table
+    used = np.flatnonzero(fit.track(balance, car.vehicle).used)
+    dull, off = used[-520:-40], used[-40:]
+    force, pull = table.specific_force.copy(), table.traction_force.copy()
+    force[dull] = -9.81 * car.vehicle.road.rolling_coefficient.value
+    pull[off] *= 1.1
+    changed = replace(balance, table=replace(table, specific_force=force, traction_force=pull))
+    guarded, free = (
+        fit.track(
+            changed,
+            car.vehicle,
+            RlsSettings(wind_up_guard=guard, forgetting=0.93, gate=math.inf, every_row=True),
+        ).running_mass
+        for guard in (True, False)
+    )
+    assert free[off[0]] > guarded[off[0]] + 0.1
 
 
 def test_the_fit_is_on_the_grid_unless_it_is_told_not_to(made, car):

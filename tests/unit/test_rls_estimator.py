@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from weighbridge import Vehicle
+from weighbridge.estimators import block_jackknife
 from weighbridge.estimators.judging import MOTION_STD, consider_std
-from weighbridge.estimators.rls import block_jackknife
 from weighbridge.vehicle import TORQUE_SOURCES, Provenance, TorqueModel
 
 CAR = Vehicle(

@@ -30,9 +30,9 @@ from weighbridge.calibration.regression import (
     join_rows,
 )
 from weighbridge.calibration.uncertain_motion import gain_std
+from weighbridge.estimators import block_jackknife
 from weighbridge.estimators.judging import cold_share
 from weighbridge.estimators.regression import regression
-from weighbridge.estimators.rls import block_jackknife
 from weighbridge.messages import Problem as Message
 from weighbridge.messages import phrase, refused
 from weighbridge.results import DelaySearch

@@ -20,6 +20,7 @@ from weighbridge.estimators import (
     vahidi,
 )
 from weighbridge.estimators.joint.contradicted import contradicted
+from weighbridge.estimators.rls import RlsSettings, block_jackknife, run_in_turn
 from weighbridge.estimators.settings import changed, differences, parsed
 from weighbridge.estimators.track import MassTrack, Segment, Status
 from weighbridge.registry import Registry
@@ -170,10 +171,13 @@ __all__ = [
     "ESTIMATORS",
     "Estimator",
     "MassTrack",
+    "RlsSettings",
     "Segment",
     "Status",
+    "block_jackknife",
     "changed",
     "contradicted",
     "differences",
     "parsed",
+    "run_in_turn",
 ]

@@ -11,7 +11,7 @@ from scipy.signal import find_peaks
 from scipy.stats import gaussian_kde
 
 from weighbridge.calibration import TABLE_5
-from weighbridge.estimators.rls import RlsSettings, run_in_turn
+from weighbridge.estimators import RlsSettings, run_in_turn
 from weighbridge.navigation import PrintedFilterSettings
 from weighbridge.papers.claims import Found, same
 from weighbridge.papers.jensen2022_drives import TABLE_B1

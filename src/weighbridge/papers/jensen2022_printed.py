@@ -13,7 +13,8 @@ from weighbridge.balance import force_balance
 from weighbridge.calibration import TrainingSettings
 from weighbridge.calibration.printed import PrintedCar, calibrate_as_printed
 from weighbridge.errors import ConfigError
-from weighbridge.estimators.rls import RlsSettings, estimate
+from weighbridge.estimators import RlsSettings
+from weighbridge.estimators.rls import estimate
 from weighbridge.estimators.track import MassTrack
 from weighbridge.navigation import printed_motion
 from weighbridge.signals import Drive

@@ -11,7 +11,8 @@ from weighbridge.balance import ForceBalance
 from weighbridge.calibration import CalibrationSettings, run_calibration
 from weighbridge.calibration.printed import PrintedCar, pulling
 from weighbridge.errors import ConfigError
-from weighbridge.estimators.rls import RlsSettings, estimate
+from weighbridge.estimators import RlsSettings
+from weighbridge.estimators.rls import estimate
 from weighbridge.papers.jensen2022_drives import (
     HIGHWAY_TRIPS,
     TABLE_B1,

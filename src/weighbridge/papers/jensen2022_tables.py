@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from weighbridge.estimators.rls import RlsSettings, run_in_turn
+from weighbridge.estimators import RlsSettings, run_in_turn
 from weighbridge.papers.jensen2022_judged import DriveResult
 from weighbridge.papers.jensen2022_reproduction import (
     HighwayResult,
