@@ -6,7 +6,7 @@ import pytest
 from tests.noted import says
 
 from weighbridge import Vehicle, read_drive
-from weighbridge.cli.own_masses import own_masses
+from weighbridge.cli.calibrate import own_masses
 from weighbridge.io import write_drive
 from weighbridge.simulation import make_scenario, simulate_car
 

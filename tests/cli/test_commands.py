@@ -10,7 +10,7 @@ import pytest
 from tests.noted import named, says
 
 from weighbridge import Vehicle, __version__, read_drive
-from weighbridge.cli.own_masses import own_masses
+from weighbridge.cli.calibrate import own_masses
 from weighbridge.estimators import ESTIMATORS
 from weighbridge.papers import jensen2022
 from weighbridge.simulation import make_scenario, simulate_car
