@@ -179,7 +179,7 @@ NAMED: Final[tuple[tuple[Callable[..., Any], dict[str, str]], ...]] = (
         "balance.instants": "identify_engine_delay",
         "balance.force_balance": "_air_std",
         "estimators.joint.load_stops": "unseen_std",
-        "estimators.joint.confounded": "inertia_relative_std",
+        "estimators.joint.slow_errors": "inertia_relative_std",
         "estimators.joint.batch": "_air_std",
         "estimators.torque_shape": "shape_std",
         "estimators.considered": "fit_consider_std",

@@ -29,7 +29,6 @@ from weighbridge.simulation import (
     usual_polling,
 )
 from weighbridge.simulation.longitudinal import SPIN_COLD, _driver, simulate_trajectory
-from weighbridge.simulation.scenario import streams
 from weighbridge.simulation.sensing import engine_load
 
 GRAVITY = 9.81
@@ -47,7 +46,7 @@ RECORDED_BOTH = 31 / 2000
 
 
 def drive(scenario):
-    random = streams(scenario.seed, "plan", "drive", "road", "imu", "gnss", "obd", "habits")
+    random = scenario.streams()
     return simulate_trajectory(scenario, random["plan"], random["drive"], random["habits"])
 
 

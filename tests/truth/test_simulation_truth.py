@@ -27,7 +27,6 @@ from weighbridge.simulation import (
 )
 from weighbridge.simulation.body import simulate_pose
 from weighbridge.simulation.longitudinal import DT, simulate_trajectory
-from weighbridge.simulation.scenario import streams
 from weighbridge.simulation.sensing import simulate_imu
 
 GRAVITY = 9.81
@@ -52,7 +51,7 @@ def short(*, without=(), duration=150.0, **changes):
 
 def inside(scenario):
     """Trajectory, pose and inertial signals at the full rate."""
-    random = streams(scenario.seed, "plan", "drive", "road", "imu", "habits")
+    random = scenario.streams()
     drive = simulate_trajectory(scenario, random["plan"], random["drive"], random["habits"])
     pose = simulate_pose(scenario, drive, random["road"])
     imu = {s.name: s for s in simulate_imu(scenario, drive, pose, random["imu"])}

@@ -10,8 +10,13 @@ from tests.noted import error
 
 from weighbridge import ConfigError, Drive, Signal, Vehicle
 from weighbridge.balance import ForceTable, Reason
-from weighbridge.estimators.joint.confounded import inertia_relative_std
-from weighbridge.estimators.joint.slow_errors import DATA_SHEET_NAMES, NAMES, design, prior_std
+from weighbridge.estimators.joint.slow_errors import (
+    DATA_SHEET_NAMES,
+    NAMES,
+    design,
+    inertia_relative_std,
+    prior_std,
+)
 from weighbridge.estimators.judging import SQUAT_STD, uncalibrated_std
 from weighbridge.vehicle import (
     Driveline,

@@ -21,8 +21,8 @@ from weighbridge.constants import GRAVITY
 from weighbridge.errors import ConfigError
 from weighbridge.estimators.considered import fit_consider_std, force_columns
 from weighbridge.estimators.gate import GateSettings
-from weighbridge.estimators.joint.confounded import inertia_relative_std
 from weighbridge.estimators.joint.problem import UNMODELLED
+from weighbridge.estimators.joint.slow_errors import inertia_relative_std
 from weighbridge.estimators.judging import (
     HIDDEN_BRAKE_STD,
     USUAL_SLOPE,

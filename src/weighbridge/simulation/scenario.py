@@ -446,8 +446,8 @@ class Scenario:
         hitch = self.trailer.hitch_load * self.trailer.mass if self.trailer else 0.0
         return self.car.mass + self.payload + hitch
 
-
-def streams(seed: int, *names: str) -> dict[str, np.random.Generator]:
-    """Return one random stream per name, so that none moves another."""
-    children = np.random.SeedSequence(seed).spawn(len(names))
-    return {n: np.random.default_rng(c) for n, c in zip(names, children, strict=True)}
+    def streams(self) -> dict[str, np.random.Generator]:
+        """Return a random stream for each part of the simulation, so that none moves another."""
+        names = ("plan", "drive", "road", "imu", "gnss", "obd", "habits")
+        children = np.random.SeedSequence(self.seed).spawn(len(names))
+        return {n: np.random.default_rng(c) for n, c in zip(names, children, strict=True)}

@@ -18,7 +18,7 @@ from weighbridge.signals import Drive, DriveInfo, Floats, Signal, from_si
 from weighbridge.simulation.body import Pose, simulate_pose
 from weighbridge.simulation.hybrid import shared
 from weighbridge.simulation.longitudinal import DT, Trajectory, simulate_trajectory
-from weighbridge.simulation.scenario import Scenario, streams
+from weighbridge.simulation.scenario import Scenario
 from weighbridge.simulation.sensing import (
     POLLABLE,
     engine_load,
@@ -172,7 +172,7 @@ def simulate_car(
     for name in (*scenario.polling.fast, *scenario.polling.slow):
         check_choice("what is polled", name, POLLABLE)
     tell = progress or (lambda done, total: None)
-    random = streams(scenario.seed, "plan", "drive", "road", "imu", "gnss", "obd", "habits")
+    random = scenario.streams()
     trajectory = simulate_trajectory(scenario, random["plan"], random["drive"], random["habits"])
     if scenario.car.split is not None:
         trajectory = shared(trajectory, scenario.car.split)

@@ -16,7 +16,6 @@ from weighbridge.balance.table import ForceTable
 from weighbridge.constants import GRAVITY
 from weighbridge.estimators.considered import fit_consider_std, force_columns, sensitivity
 from weighbridge.estimators.joint.bend import KNEE, above_knee, torque_bend
-from weighbridge.estimators.joint.confounded import inertia_relative_std
 from weighbridge.estimators.joint.load_stops import (
     change_odds,
     stood_before,
@@ -34,6 +33,7 @@ from weighbridge.estimators.joint.slow_errors import (
     LASTING,
     SlowErrors,
     design,
+    inertia_relative_std,
     noise_variance,
     prior_std,
     usable_rows,

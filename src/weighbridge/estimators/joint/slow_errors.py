@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Final, TypeVar
 
@@ -12,6 +13,7 @@ from weighbridge.balance.law import DISTURBANCE_STD
 from weighbridge.balance.table import ForceTable
 from weighbridge.constants import GRAVITY
 from weighbridge.estimators.regression import regression
+from weighbridge.estimators.squat import share_of_accel
 from weighbridge.kernels.disturbance import DisturbanceParams
 from weighbridge.navigation import BY_SPEED, Motion
 from weighbridge.signals import Bools, Floats
@@ -57,7 +59,7 @@ calibration finds once is found from each drive. An offset of the torque works t
 gear, and low gears go with strong acceleration: taken for none it makes mass. So does
 friction that grows with engine speed, which is high where torque is. The inertias are states
 where there are several gears: with one they are like the scale and the lean of the
-accelerometer, which would be taken for them (`weighbridge.estimators.joint.confounded`)."""
+accelerometer, which would be taken for them (`inertia_relative_std`)."""
 
 
 RATIO_LATENESS: Final = "ratio_lateness"
@@ -291,3 +293,30 @@ def filter_params(std: Floats, gate: float, settle_rows: int, jump_rows: int) ->
         settle_rows=settle_rows,
         jump_rows=jump_rows,
     )
+
+
+def inertia_relative_std(
+    vehicle: Vehicle, mass: float, accel: Floats, phi: Floats, used: Bools
+) -> float:
+    """Relative standard deviation of a mass by the inertias of a data sheet with one gear [-].
+
+    With one gear the rotating mass is the same all the time. Only hills, which accelerate
+    nothing, separate it from the mass, and they do so no better than the accelerometer's
+    scale and lean are known. So it is considered (Schmidt, 1966), not estimated. With
+    several gears it is a state.
+
+    Parameters
+    ----------
+    vehicle
+    mass : [kg]
+    accel, phi : (n,) acceleration and regressor of the mass [m/s^2]
+    used : (n,)
+    """
+    line = vehicle.driveline
+    if not (by_data_sheet(vehicle) and line.single_speed) or not mass > 0.0:
+        return 0.0
+    engine, wheels = vehicle.road.engine_inertia, vehicle.road.wheel_inertia
+    turns = float(law.engine_inertia_column(line.gearings[0], 1.0))
+    rolls = float(law.wheel_inertia_column(1.0, line.wheel_radius))
+    rotating = math.hypot(engine.std * turns, wheels.std * rolls)
+    return rotating / mass * share_of_accel(accel, phi, used)
