@@ -148,9 +148,9 @@ NAMED: Final[tuple[tuple[Callable[..., Any], dict[str, str]], ...]] = (
         "vehicle.power_balance": "find_power_balance",
         "balance.hybrid": "motor_helps",
         "checks.clocks": "_packets",
-        "calibration.known_mass": "scale_finding fuel_finding drag_finding check_mass",
+        "calibration.known_mass": "scale_finding fuel_finding drag_finding check_mass "
+        "refuse_too_heavy",
         "calibration.joint": "_refuse_strange",
-        "calibration.questionable_masses": "refuse_too_heavy",
         "calibration.problem": "_refuse_foreign_gears",
         "calibration.run": "_refuse_useless unfound_gears",
         "calibration.fitted": "check_delay",
@@ -205,7 +205,7 @@ NAMED: Final[tuple[tuple[Callable[..., Any], dict[str, str]], ...]] = (
         "balance.braking": "_misses _braked _trailing retarder_unreported",
     }),
     (_empty, {
-        "calibration.questionable_masses": "questionable_masses contradicting unbacked_scale",
+        "calibration.known_mass": "questionable_masses contradicting unbacked_scale",
         "calibration.uncertain_motion": "uncertain_gains",
         "calibration.run": "_mass_findings _balance_notes",
         "navigation.identify.remounting": "find_changes",

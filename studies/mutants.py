@@ -79,7 +79,7 @@ MUTANTS = (
         ("tests/unit/test_inertia.py", "tests/consistency/test_inertia_consistency.py"),
     ),
     Mutant(
-        "calibration/questionable_masses.py",
+        "calibration/known_mass.py",
         "left = np.array(masses) - np.array(",
         "left = np.array(masses) + np.array(",
         "a sign",

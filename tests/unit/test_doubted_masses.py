@@ -6,9 +6,9 @@ from types import SimpleNamespace
 import numpy as np
 
 from weighbridge import Problem, Vehicle
-from weighbridge.calibration import questionable_masses as module
+from weighbridge.calibration import known_mass as module
 from weighbridge.calibration import tared, with_findings
-from weighbridge.calibration.questionable_masses import contradicting, unbacked_scale
+from weighbridge.calibration.known_mass import contradicting, unbacked_scale
 from weighbridge.messages import phrase
 from weighbridge.vehicle import TorqueModel
 

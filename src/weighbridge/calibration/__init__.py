@@ -1,8 +1,8 @@
 """Vehicle parameters from drives of known mass."""
 
 from weighbridge.calibration.grid import TABLE_5, grid_search
+from weighbridge.calibration.known_mass import tared, with_findings
 from weighbridge.calibration.printed import TrainingSettings
-from weighbridge.calibration.questionable_masses import tared, with_findings
 from weighbridge.calibration.regression import build_rows
 from weighbridge.calibration.run import (
     calibrate,

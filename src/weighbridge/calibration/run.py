@@ -18,17 +18,15 @@ from weighbridge.calibration.joint import fit_joint, fit_speed_torque
 from weighbridge.calibration.known_mass import (
     drag_finding,
     fuel_finding,
-    scale_by_mass,
-    scale_finding,
-)
-from weighbridge.calibration.printed import PrintedCar, calibrate_as_printed
-from weighbridge.calibration.problem import Problem, checked, problem_of
-from weighbridge.calibration.questionable_masses import (
     questionable_masses,
     refuse_too_heavy,
+    scale_by_mass,
+    scale_finding,
     unbacked_scale,
     with_findings,
 )
+from weighbridge.calibration.printed import PrintedCar, calibrate_as_printed
+from weighbridge.calibration.problem import Problem, checked, problem_of
 from weighbridge.calibration.rls import fit_rls
 from weighbridge.calibration.settings import CalibrationSettings
 from weighbridge.calibration.speed import SpeedCalibration, calibrate_by_speed

@@ -25,7 +25,7 @@ def changed(settings: Any, given: Mapping[str, object]) -> Any:
     Parameters
     ----------
     settings : a frozen dataclass of numbers, switches, choices, tuples of numbers and settings
-        within; None stands for a number that another part of the vehicle or drive gives
+        within; in place of None a number is taken: another part of vehicle or drive gives it
     given : new values by name; ``ekf.start.threshold`` names one of settings within
 
     Raises

@@ -49,5 +49,5 @@ def quietly() -> Iterator[None]:
 
 
 def first_line(error: BaseException) -> str:
-    """First line of a library's message, as much of it as helps."""
+    """Return the first line of a library's message, cut off where it is long."""
     return visible(str(error).strip().split("\n", 1)[0])[:_LONGEST]
