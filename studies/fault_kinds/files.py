@@ -22,44 +22,46 @@ MASSES_WORDS = (
 )
 
 Rng = np.random.Generator
-Cells = list[list[str]]
 DATE = 1_614_936_600.0
 """2021-03-05 as seconds since 1970."""
 
 
-def _edit(folder: Path, table: str, change: Callable[[list[str], Cells], None]) -> None:
-    """Change the cells of a table as text: ``change(names, rows)``."""
+def _edit(
+    folder: Path, table: str, column: str, change: Callable[[list[str]], dict[int, str]]
+) -> None:
+    """Change cells of a column as text: ``change(cells)`` returns the new ones by their row."""
     path = folder / f"{table}.csv"
     head, *lines = path.read_text(encoding="utf-8").splitlines()
-    rows = [line.split(",") for line in lines]
-    change(head.split(","), rows)
-    text = "\n".join([head, *(",".join(row) for row in rows)])
-    path.write_text(text + "\n", encoding="utf-8")
+    at = head.split(",").index(column)
+    cells = [line.split(",", at + 1)[at] for line in lines]
+    for row, text in change(cells).items():
+        whole = lines[row].split(",")
+        whole[at] = text
+        lines[row] = ",".join(whole)
+    path.write_text("\n".join([head, *lines]) + "\n", encoding="utf-8")
 
 
 def _stamps(folder: Path, table: str, change: Callable[[np.ndarray], np.ndarray]) -> None:
     """Change the times of a table; whole numbers of them are written in full."""
 
-    def rewrite(names: list[str], rows: Cells) -> None:
-        at = names.index("time_s")
-        for row, value in zip(
-            rows, change(np.array([float(r[at]) for r in rows])).tolist(), strict=True
-        ):
-            row[at] = repr(value)
+    def rewrite(cells: list[str]) -> dict[int, str]:
+        before = np.array(cells, dtype=float)
+        after = change(before.copy())
+        rows = np.flatnonzero(after != before)
+        texts = map(repr, after[rows].tolist())
+        return dict(zip(rows.tolist(), texts, strict=True))
 
-    _edit(folder, table, rewrite)
+    _edit(folder, table, "time_s", rewrite)
 
 
 def _put(folder: Path, table: str, column: str, text: str, places: Sequence[float]) -> None:
     """Write a text into cells of a column, at parts of the table."""
 
-    def rewrite(names: list[str], rows: Cells) -> None:
-        at = names.index(column)
-        filled = [k for k, row in enumerate(rows) if row[at]]
-        for part in places:
-            rows[filled[int(part * (len(filled) - 1))]][at] = text
+    def rewrite(cells: list[str]) -> dict[int, str]:
+        filled = [row for row, cell in enumerate(cells) if cell]
+        return {filled[int(part * (len(filled) - 1))]: text for part in places}
 
-    _edit(folder, table, rewrite)
+    _edit(folder, table, column, rewrite)
 
 
 def imu_clock_from_1970(folder: Path, severity: float, rng: Rng) -> None:

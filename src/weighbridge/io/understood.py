@@ -197,13 +197,14 @@ class _Rows:
     def __init__(self, data: bytes, columns: int, separator: str) -> None:
         self._data, self._columns, self._separator = data, columns, separator
         text = np.frombuffer(data if data.endswith(b"\n") else data + b"\n", np.uint8)
-        free = np.ones(text.size, dtype=bool)
+        ends, marks = text == ord("\n"), text == ord(separator)
         if b'"' in data and data.count(b'"') % 2 == 0:
             free = np.cumsum(text == ord('"')) % 2 == 0
-        self.ends = np.flatnonzero((text == ord("\n")) & free)
+            ends &= free
+            marks &= free
+        self.ends = np.flatnonzero(ends)
         self.starts = np.concatenate([[0], self.ends[:-1] + 1])
-        marks = np.concatenate([[0], np.cumsum((text == ord(separator)) & free)])
-        parts = marks[self.ends] - marks[self.starts]
+        parts = np.diff(np.searchsorted(np.flatnonzero(marks), self.ends), prepend=0)
         blank = self.ends == self.starts
         blank |= (self.ends - self.starts == 1) & (text[self.starts] == ord("\r"))
         self.lone = (parts == 0) & ~blank & (columns > 1)
