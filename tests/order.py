@@ -1,7 +1,7 @@
 """Which tests run first, and which only when asked for.
 
-Files that start other programs come first, then long ones. `.ci/quick` takes what fits. Tests of
-`long.toml` run with ``--long``.
+Files that start other programs come first, then long ones; those that need the browser are run one
+at a time. `.ci/quick` takes what fits. Tests of `long.toml` run with ``--long``.
 
 ``pytest --junitxml=build/tests.xml`` and then ``python -m tests.order build/tests.xml`` write
 the list again.
@@ -27,7 +27,7 @@ STARTING = (
 """Files whose tests start processes through the program; each takes up to 400 MB."""
 
 UNKNOWN = 10.0
-"""Taken by `.ci/quick` for a file that is not on the list [s]."""
+"""Taken for a file that is not on the list [s]."""
 
 
 def seconds() -> dict[str, float]:
@@ -42,19 +42,41 @@ def longest_first(items: list) -> None:
     Before them come files that start other programs, while the workers themselves are small.
     """
     known = seconds()
-    starting = {
+    took = {i.path: known.get(i.path.relative_to(ROOT).as_posix(), math.inf) for i in items}
+    browsing = {item.path for item in items if "chromium" in item.fixturenames}
+    starting = browsing | {
         item.path
         for item in items
-        if "browser" in item.fixturenames
-        or hasattr(item.module, "subprocess")
-        or item.path.as_posix().endswith(STARTING)
+        if hasattr(item.module, "subprocess") or item.path.as_posix().endswith(STARTING)
     }
-    items.sort(
-        key=lambda item: (
-            item.path not in starting,
-            -known.get(item.path.relative_to(ROOT).as_posix(), math.inf),
-        )
-    )
+    files = sorted(took, key=lambda path: (path not in starting, -took[path]))
+    place = {path: k for k, path in enumerate(one_at_a_time(files, browsing, took))}
+    items.sort(key=lambda item: place[item.path])
+
+
+def one_at_a_time(files: list, browsing: set, took: dict) -> list:
+    """Put files apart that wait for each other, where two workers take one after another.
+
+    Parameters
+    ----------
+    files : in the order that is kept otherwise
+    browsing : those of them that need the one browser
+    took : of each [s]
+    """
+    waiting = [file for file in files if file in browsing]
+    others = [file for file in files if file not in browsing]
+    ordered: list = []
+    free, closed = [0.0, 0.0], 0.0
+    while waiting or others:
+        begin = min(free)
+        turn = waiting if waiting and (closed <= begin or not others) else others
+        ordered.append(turn.pop(0))
+        last = took[ordered[-1]]
+        end = begin + (last if math.isfinite(last) else UNKNOWN)
+        free[free.index(begin)] = end
+        if turn is waiting:
+            closed = end
+    return ordered
 
 
 def guards() -> dict[str, str]:

@@ -1,5 +1,7 @@
 """Which tests `.ci/quick` chooses."""
 
+import math
+
 from tests import changed, order
 
 TESTS = {
@@ -37,3 +39,10 @@ def test_the_order_is_read_from_the_results(tmp_path, monkeypatch):
     monkeypatch.setattr(order, "LIST", written)
     order.write(results)
     assert order.seconds() == {"tests/unit/test_changed.py": 3.2}
+
+
+def test_files_that_need_the_browser_are_not_run_at_once():
+    took = {"page": 20.0, "site": 10.0, "first": 15.0, "second": 5.0, "new": math.inf}
+    ordered = order.one_at_a_time(list(took), {"page", "site"}, took)
+    # The browser is free after 20 s, as is who ran "second".
+    assert ordered == ["page", "first", "second", "site", "new"]
