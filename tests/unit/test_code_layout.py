@@ -32,9 +32,17 @@ def given(known):
                     yield from {node.module} & {f"{room}.{alias.name}" for alias in node.names}
 
 
+def statements(node):
+    """Statements in a node, at any depth; expressions, of which there are many more, hold none."""
+    for child in ast.iter_child_nodes(node):
+        if isinstance(child, ast.stmt | ast.excepthandler | ast.match_case):
+            yield child
+            yield from statements(child)
+
+
 def imported(tree, known, given=frozenset()):
     """Modules that a tree imports, at run time or for its types."""
-    for node in ast.walk(tree):
+    for node in statements(tree):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names if alias.name in known)
         elif isinstance(node, ast.ImportFrom) and node.module in known:
