@@ -2,6 +2,7 @@
 
 import contextlib
 import ctypes
+import functools
 import gc
 import os
 import shutil
@@ -44,9 +45,17 @@ def _keep_drives() -> None:
     keep_drives(Path(os.environ["NUMBA_CACHE_DIR"]))
 
 
+def _make_commands_once() -> None:
+    """Let the command line keep its commands, which typer makes anew for each that is run."""
+    import typer.main
+
+    typer.main.get_command = functools.cache(typer.main.get_command)
+
+
 # The process that hands the tests out simulates nothing, and needs no compiler in its memory.
 if WORKER:
     _keep_drives()
+    _make_commands_once()
 
 CHROMIUM = next(
     filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
@@ -69,9 +78,10 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_sessionstart(session: pytest.Session) -> None:
-    """Keep simulated drives where no worker runs the tests."""
+    """Keep drives and commands where no worker runs the tests."""
     if not (WORKER or session.config.getoption("numprocesses", None)):
         _keep_drives()
+        _make_commands_once()
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
@@ -89,9 +99,10 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 
 def pytest_collection_finish() -> None:
-    """Take what was collected, which stays to the end, out of what is searched for garbage."""
+    """Search for garbage seldom, and not in what was collected, which stays to the end."""
     gc.collect()
     gc.freeze()
+    gc.set_threshold(20_000, 20, 20)
 
 
 @pytest.hookimpl(trylast=True)
