@@ -170,7 +170,7 @@ NAMED: Final[tuple[tuple[Callable[..., Any], dict[str, str]], ...]] = (
         "estimators.joint.changing": "_without_launches",
         "estimators.joint.switched": "without_switched",
         "navigation.clock_drift": "correct_clocks _narrowed",
-        "calibration.joint": "_with_dragged _without",
+        "calibration.joint": "_with_dragged",
         "signals.timeline": "one_recording well_formed",
     }),
     (_zero, {

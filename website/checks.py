@@ -34,7 +34,8 @@ vehicle of the corpus, on which every change to the program is tried:
 - In brackets: how many of these pairs have no mass. Other checks may have had a part in it.
 
 The other table of a section has the numbers by which the module decides, with their units, and
-where they come from. Modules that find nothing themselves have this table alone.
+where they come from. Modules that find nothing themselves have this table alone. Numbers that many
+modules share are in [limits](#limits).
 
 Three examples:
 
@@ -69,10 +70,9 @@ def checks_page() -> str:
         "looked at while the limits were chosen: these counts are no claim about other drives.",
         "",
     ]
-    texts = {
-        path: path.read_text(encoding="utf-8")
-        for path in sorted(path for room in ROOMS for path in (SOURCE / room).rglob("*.py"))
-    }
+    shared = (SOURCE / "constants.py", SOURCE / "limits.py")
+    rooms = sorted(path for room in ROOMS for path in (SOURCE / room).rglob("*.py"))
+    texts = {path: path.read_text(encoding="utf-8") for path in (*shared, *rooms)}
     found = found_by([ast.parse(text) for text in texts.values()])
     for (path, text), ids in zip(texts.items(), found, strict=True):
         tree = ast.parse(text)

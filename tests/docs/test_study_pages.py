@@ -1,6 +1,7 @@
 """Pages of studies are their templates with figures."""
 
 import re
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -23,3 +24,13 @@ def test_a_page_is_its_template_with_figures(study):
     pattern = re.sub(r"\\\{\w+\\\}", ".+?", re.escape(template))
     page = (HOME / PAGES[study]).read_text(encoding="utf-8")
     assert re.fullmatch(pattern, page, re.DOTALL)
+
+
+def test_the_parts_whose_worth_is_measured_are_in_the_program(monkeypatch):
+    for place in (HOME, HOME / "studies"):
+        monkeypatch.syspath_prepend(place)
+    ablation = import_module("ablation")
+
+    parts = ablation._parts().values()
+    assert len(parts) > 100
+    assert [p for p in parts if not hasattr(import_module(p.module), p.name)] == []

@@ -10,10 +10,11 @@ import weighbridge as wb
 from weighbridge import Vehicle
 from weighbridge.balance import force_balance
 from weighbridge.calibration import run_calibration
+from weighbridge.limits import LOCKED
 from weighbridge.navigation import find_motion
 from weighbridge.pipeline.forward import forward_weigh, identify_forward
 from weighbridge.simulation import Sensors, make_scenario, simulate_car
-from weighbridge.vehicle import UNSLIPPED, Driveline
+from weighbridge.vehicle import Driveline
 
 
 def drive(payload, seed, name="cvt-calibration"):
@@ -71,7 +72,7 @@ def test_ratio_and_rate_of_its_engine_are_those_of_the_simulation(known):
     known_car = replace(known_car, torque=replace(known_car.torque, source="percent"))
     motion = find_motion(made.drive, known_car)
     table = force_balance(made.drive, known_car, motion, delay=0.1).table
-    assert np.all(table.speed[table.usable] >= UNSLIPPED)
+    assert np.all(table.speed[table.usable] >= LOCKED)
     gearing = np.interp(table.time, truth.time, truth.engine_speed / np.maximum(truth.speed, 0.1))
     rate = np.interp(table.time, truth.time, np.gradient(truth.engine_speed, truth.time))
     use = table.usable & np.isfinite(table.engine_accel)

@@ -8,31 +8,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.signal import lfilter
 
 import weighbridge as wb
-from weighbridge.balance import best_delay
 from weighbridge.calibration.joint import USUAL_DELAY, USUAL_LAG, find_timing
 from weighbridge.kernels.first_order import even_lag, fading, first_order
 from weighbridge.simulation import Sensors, make_scenario, simulate_car
-
-
-def test_the_lowest_point_is_found_between_grid_points():
-    assert best_delay(lambda d: (d - 0.137) ** 2) == pytest.approx(0.137, abs=1e-6)
-    assert best_delay(lambda d: abs(d - 0.213) ** 1.5) == pytest.approx(0.213, abs=0.005)
-
-
-def test_no_delay_is_told_at_an_end_or_without_rows():
-    assert np.isnan(best_delay(lambda d: d))
-    assert np.isnan(best_delay(lambda d: float("nan")))
-
-
-@pytest.mark.parametrize("true", [-1.37, -0.55, 1.83])
-def test_the_search_goes_on_beyond_an_end(true):
-    assert best_delay(lambda d: (d - true) ** 2) == pytest.approx(true, abs=1e-6)
-
-
-def test_the_search_goes_no_farther_than_its_farthest():
-    tried = []
-    assert np.isnan(best_delay(lambda d: tried.append(d) or d))
-    assert min(tried) == pytest.approx(-2.4)  # s
 
 
 @pytest.mark.parametrize(("delay", "lag"), [(-1.4, 0.3), (-0.1, 0.2), (1.6, 0.1)])

@@ -1,7 +1,6 @@
 """Forces against motion: where every torque source and every motion source ends."""
 
 from weighbridge.balance.averaging import PAUSE, WINDOW, Windows, window_params, windows
-from weighbridge.balance.delay import best_delay
 from weighbridge.balance.force_balance import force_balance
 from weighbridge.balance.height_scale import height_scale
 from weighbridge.balance.second_signal_learning import learn_second_signals
@@ -16,7 +15,6 @@ __all__ = [
     "ForceTable",
     "Reason",
     "Windows",
-    "best_delay",
     "force_balance",
     "height_scale",
     "learn_second_signals",

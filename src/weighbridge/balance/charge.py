@@ -13,7 +13,6 @@ import numpy as np
 
 from weighbridge.balance.second_signal import (
     BY_SIGNAL,
-    FEWEST_MEANS,
     air_of,
     compare,
     means,
@@ -21,6 +20,7 @@ from weighbridge.balance.second_signal import (
     ranges_of,
     rows_of,
 )
+from weighbridge.limits import SOME
 from weighbridge.signals import Drive
 from weighbridge.vehicle import Vehicle
 
@@ -51,7 +51,7 @@ def in_this_air(drive: Drive, vehicle: Vehicle) -> Vehicle:
         if rows is None or relation.pressure is None or relation.temperature is None:
             continue
         part = means(rows, second_signal, ranges_of(relation))
-        if part.time.size < FEWEST_MEANS:
+        if part.time.size < SOME:
             continue
         found = compare(part.reading, predicted_by(relation, part))
         pressure, temperature = air_of(drive, float(part.time[0]), float(part.time[-1]))

@@ -7,8 +7,9 @@ from typing import Final
 
 import numpy as np
 
-from weighbridge.balance.gear_fit import FEWEST_RATIOS, held_ratios
+from weighbridge.balance.gear_fit import held_ratios
 from weighbridge.balance.table import ForceBalance
+from weighbridge.limits import MANY
 from weighbridge.messages import Problem
 from weighbridge.vehicle import Vehicle
 
@@ -53,7 +54,7 @@ def on_its_tyres(balance: ForceBalance, vehicle: Vehicle) -> tuple[Vehicle, Prob
     _, ratio = held_ratios(balance)
     change = float(np.log(shown / line.speed_scale))
     std = motion.speed_scale_std or 0.0
-    if ratio.size < FEWEST_RATIOS or not max(LEAST, 3.0 * std) < abs(change) < MOST:
+    if ratio.size < MANY or not max(LEAST, 3.0 * std) < abs(change) < MOST:
         return vehicle, None
     off = ratio[:, None] - change - np.log(np.array(line.gearings))
     off = off[np.arange(ratio.size), np.abs(off).argmin(axis=1)]

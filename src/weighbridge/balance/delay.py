@@ -16,6 +16,7 @@ from weighbridge.balance.table import ForceBalance
 from weighbridge.navigation import Motion
 from weighbridge.signals import Drive, Floats
 from weighbridge.signals.correlation import correlation
+from weighbridge.signals.lag import find_lag, lag_std_at, parabola
 from weighbridge.vehicle import Vehicle
 from weighbridge.vehicle.torque import source_signal
 
@@ -29,10 +30,6 @@ FARTHEST: Final = 2.4
 """Where the best lies at an end of the search, it goes on as far as this [s]: a speed of the
 instrument cluster, polled once a second, is behind the load by 1 to 1.5 s."""
 
-FURTHER: Final = 0.8
-"""By how much the search goes on at a time [s]."""
-
-
 SAME_CLOCK: Final = 0.15
 """Torque later or earlier than in the calibration by less is on the same clock [s]: in 15 simulated
 drives of five vehicles it differed by 0.05 s at most. Masses are 0.2 % light at 0.15 s."""
@@ -44,105 +41,6 @@ before; of the pairs whose clocks are wrong, 31 as before."""
 
 _NEAR_BY: Final = 0.3
 """Shifts compared with none at first [s]."""
-
-
-def best_delay(
-    misfit: Callable[[float], float],
-    *,
-    start: float = EARLIEST,
-    end: float = LATEST,
-    farthest: float = FARTHEST,
-) -> float:
-    """Minimise ``misfit`` over the delay: a coarse grid, steps downhill, a parabola.
-
-    Where the best of the coarse grid lies at an end, the grid goes on beyond it.
-
-    Parameters
-    ----------
-    misfit : of a delay in s; NaN where it cannot be seen
-    start, end : of the search at first [s]
-    farthest : delay on either side at which it stops [s]
-
-    Returns
-    -------
-    float
-        Delay [s]; NaN where no delay can be shown or the best lies at the farthest.
-    """
-    step = 0.2
-    grid = np.arange(start, end + 0.5 * step, step)
-    scores = np.array([misfit(float(delay)) for delay in grid])
-    while np.isfinite(scores).all() and int(np.argmin(scores)) in (0, grid.size - 1):
-        more = beyond(grid, scores, step, farthest)
-        if not more.size:
-            return float("nan")
-        grid = np.concatenate([grid, more])
-        scores = np.concatenate([scores, [misfit(float(delay)) for delay in more]])
-        order = np.argsort(grid)
-        grid, scores = grid[order], scores[order]
-    if not np.isfinite(scores).all():
-        return float("nan")
-    best = int(np.argmin(scores))
-    for finer, most in ((0.5 * step, 1), (0.02, 4)):
-        centre = vertex(grid[best - 1 : best + 2], scores[best - 1 : best + 2])
-        around = _downhill(misfit, centre, finer, most)
-        if around is None:
-            return float("nan")
-        grid, scores = around
-        best = 1
-    return vertex(grid, scores)
-
-
-def _downhill(
-    misfit: Callable[[float], float], centre: float, step: float, most: int
-) -> tuple[Floats, Floats] | None:
-    """Go downhill from ``centre`` to three delays whose middle one is lowest; and their misfits.
-
-    None where it is not reached in ``most`` steps to one side.
-    """
-    found: dict[int, float] = {}
-    at = 0
-    while abs(at) <= most:
-        for k in (at - 1, at, at + 1):
-            if k not in found:
-                found[k] = misfit(centre + k * step)
-        low, middle, high = (found[k] for k in (at - 1, at, at + 1))
-        if not np.isfinite([low, middle, high]).all():
-            return None
-        if middle <= low and middle <= high:
-            delays = np.array([centre + step * k for k in (at - 1, at, at + 1)])
-            return delays, np.array([low, middle, high])
-        at += -1 if low < high else 1
-    return None
-
-
-def beyond(grid: Floats, scores: Floats, step: float, farthest: float) -> Floats:
-    """Return the instants to try next beyond the better end of a rising grid [s], if any."""
-    ahead = step * np.arange(1, round(FURTHER / step) + 1)
-    more = grid[-1] + ahead if scores[-1] < scores[0] else grid[0] - ahead
-    return np.asarray(more[np.abs(more) <= farthest + 1e-9])
-
-
-def delay_std(misfit: Callable[[float], float], delay: float, rows: float) -> float:
-    """Standard deviation of the delay that minimises a residual's standard deviation.
-
-    Parameters
-    ----------
-    misfit : standard deviation of the residual over the delay [s]
-    delay : where it is lowest [s]
-    rows : number of independent rows behind it
-
-    Returns
-    -------
-    float
-        [s]; NaN where the misfit has no lowest point there. From the curvature
-        of the Gaussian likelihood ``-n/2 log(variance)``.
-    """
-    reach = 0.1
-    low, middle, high = (misfit(delay + step) ** 2 for step in (-reach, 0.0, reach))
-    curvature = (low - 2.0 * middle + high) / reach**2
-    if not curvature > 0.0 or not rows > 0.0:
-        return float("nan")
-    return float(np.sqrt(2.0 * middle / (rows * curvature)))
 
 
 def estimate_torque_delay(
@@ -164,7 +62,7 @@ def estimate_torque_delay(
         The drive lacks what the torque source needs.
     """
     misfit, _ = _misfit(drive, vehicle, motion, begun, np.array([EARLIEST, -EARLIEST]))
-    return best_delay(misfit)
+    return find_lag(misfit, EARLIEST, LATEST, farthest=FARTHEST)
 
 
 def clock_shift(drive: Drive, vehicle: Vehicle, motion: Motion, begun: ForceBalance) -> float:
@@ -194,7 +92,7 @@ def clock_shift(drive: Drive, vehicle: Vehicle, motion: Motion, begun: ForceBala
         shift = _little(misfit, known, shifts[1:4], scores[1:4])
         if shift == 0.0:
             return 0.0
-        own = delay_std(lambda at: math.sqrt(misfit(at) * (2.0 - misfit(at))), known + shift, rows)
+        own = lag_std_at(lambda at: misfit(at) * (2.0 - misfit(at)), known + shift, rows)
         unsure = math.hypot(own, vehicle.timing.torque_delay_std or 0.0)
         return shift if abs(shift) > SURE * unsure else 0.0
     as_known = scores[2]
@@ -204,14 +102,14 @@ def clock_shift(drive: Drive, vehicle: Vehicle, motion: Motion, begun: ForceBala
     if best in (0, shifts.size - 1) or scores[best] > 0.5 * as_known:
         return 0.0
     near = slice(best - 1, best + 2)
-    return vertex(shifts[near], scores[near])
+    return parabola(shifts[near], scores[near]).at
 
 
 def _little(
     misfit: Callable[[float], float], known: float, shifts: Floats, scores: Floats
 ) -> float:
     """Find a shift of less than half a second; 0 within `SAME_CLOCK`."""
-    shift = vertex(shifts, scores)
+    shift = parabola(shifts, scores).at
     if abs(shift) <= 0.5 * SAME_CLOCK:
         return 0.0
     for reach in (0.2, 0.1):
@@ -219,7 +117,7 @@ def _little(
         scores = np.array([misfit(float(known + s)) for s in shifts])
         if not np.isfinite(scores).all():
             return 0.0
-        shift = vertex(shifts, scores)
+        shift = parabola(shifts, scores).at
     return shift if abs(shift) > SAME_CLOCK else 0.0
 
 
@@ -257,12 +155,3 @@ def _misfit(
         return 1.0 - correlation(force_on_mass(table, vehicle)[rows], table.specific_force[rows])
 
     return misfit, np.count_nonzero(common) * period / WINDOW
-
-
-def vertex(x: Floats, y: Floats) -> float:
-    """Abscissa of the lowest point of the parabola through three points."""
-    curvature = y[0] - 2.0 * y[1] + y[2]
-    if curvature <= 0.0:
-        return float(x[1])
-    shift = 0.5 * (y[0] - y[2]) / curvature
-    return float(x[1] + np.clip(shift, -1.0, 1.0) * (x[1] - x[0]))

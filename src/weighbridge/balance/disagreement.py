@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Final, Literal
 
@@ -9,8 +10,6 @@ import numpy as np
 
 from weighbridge.balance.second_signal import (
     BY_SIGNAL,
-    DELAYS,
-    FEWEST_MEANS,
     LOAD_AIR,
     Means,
     air_of,
@@ -21,6 +20,7 @@ from weighbridge.balance.second_signal import (
     ranges_of,
     rows_of,
 )
+from weighbridge.limits import DOUBTED, SOME
 from weighbridge.messages import phrase
 from weighbridge.signals import Drive
 from weighbridge.vehicle import SecondSignalRelation, Vehicle
@@ -31,9 +31,8 @@ QUESTIONABLE: Final = 0.05
 SERIOUS: Final = 0.09
 """The same, above which there is no mass [-]: the mass is off by 1.1 to 1.5 times as much."""
 
-QUESTION_SURE: Final = 2.0
 SURE: Final = 3.5
-"""Standard deviations by which it has to be off for the one and for the other [-]. With these, 8 of
+"""Standard deviations by which it has to be off for that, `DOUBTED` to be questioned [-]. So 8 of
 1184 pairs of calibration and drive of recorded vehicles were questioned (a petrol car's load by
 intake pressure, another's torque by it, an electric car by its battery), and 2 refused beside those
 with a trip whose torque repeats one value to its end."""
@@ -96,12 +95,12 @@ def _finding(drive: Drive, vehicle: Vehicle, relation: SecondSignalRelation) -> 
     if rows is None:
         return None
     lag = lateness(rows, second_signal, relation)
-    if lag in (DELAYS[0], DELAYS[-1]):
+    if lag is not None and math.isnan(lag):
         return None  # It is on another clock, further away than was tried.
     if lag is not None and abs(later := lag - (relation.lag or 0.0)) >= LATER:
         rows = rows_of(drive, vehicle, second_signal, later) or rows
     found = means(rows, second_signal, ranges_of(relation))
-    if found.time.size < FEWEST_MEANS:
+    if found.time.size < SOME:
         return None
     air = air_of(drive, float(found.time[0]), float(found.time[-1]))
     return judged(found, relation, accepted_scales(vehicle.torque.of_source.name, relation, air))
@@ -156,7 +155,7 @@ def judged(
 def _verdict(off: float, std: float) -> Verdict:
     if off > max(SERIOUS, SURE * std):
         return "serious"
-    return "doubtful" if off > max(QUESTIONABLE, QUESTION_SURE * std) else "agrees"
+    return "doubtful" if off > max(QUESTIONABLE, DOUBTED * std) else "agrees"
 
 
 def accepted_scales(

@@ -22,6 +22,7 @@ from weighbridge.balance.foot_setup import (
     turning_at,
 )
 from weighbridge.kernels import two_states
+from weighbridge.limits import DRIVES, SURE
 from weighbridge.signals import Bools, Drive, Floats, Signal
 from weighbridge.vehicle import Vehicle
 
@@ -39,12 +40,6 @@ ODDS: Final = (-5.0, 3.0)
 
 PROBABLE: Final = 0.3
 """Probability above which the foot counts as off the accelerator [-]."""
-
-NOISE_REACH: Final = 3.0
-"""Standard deviations of its noise by which a reading falls below what the motion asks for [-]."""
-
-WALKING: Final = 3.0
-"""Speed from which a vehicle that stops has been driven [m/s]."""
 
 STANDING: Final = 0.3
 """Speed below which it stands [m/s]."""
@@ -118,7 +113,7 @@ def _stops(drive: Drive) -> bool:
     if speed is None:
         return False
     size = np.abs(speed.values)
-    fast = size[(size > WALKING) | (size < STANDING)] > WALKING
+    fast = size[(size > DRIVES) | (size < STANDING)] > DRIVES
     return bool(np.any(fast[:-1] & ~fast[1:]))
 
 
@@ -188,7 +183,7 @@ def _noisy(source: Signal, level: Floats, torque: Floats, setup: FootSetup) -> B
     asked = setup.asked.at(setup.mean(torque, source.time, until))
     clear = asked > level + PUSHED * setup.floor.span
     pushes = ~near(source.time, ~clear, source.time, SETTLED, 0.0 if setup.forward else math.inf)
-    return np.asarray(pushes & (asked - source.values < NOISE_REACH * setup.asked.noise))
+    return np.asarray(pushes & (asked - source.values < SURE * setup.asked.noise))
 
 
 def _log_odds(above: Floats, scatter: Floats | float, span: float) -> Floats:

@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 
 from weighbridge.balance.floor import FEWEST_IN_BIN, SCATTER, Floor, find_floor
+from weighbridge.limits import MOVES, SURE
 from weighbridge.signals import Bools, Drive, Floats, Signal, spread
 from weighbridge.vehicle import DraggedReading, Vehicle
 from weighbridge.vehicle.torque import averaged
@@ -24,9 +25,6 @@ FARTHEST: Final = 0.15
 """Such readings over their floor, over the range of the reading, at most [-]: of a recorded car a
 quarter of the braked readings lay within 0.04 of the floor and three quarters within 0.1."""
 
-BEYOND: Final = 3.0
-"""Standard deviations of the floor within which a reading lies on it [-]."""
-
 PUSHED: Final = 0.1
 """Reading that the motion asks for over its floor, over the range of the reading, above which a
 low reading may be noise [-]."""
@@ -36,9 +34,6 @@ PUSHED_TIME: Final = 1.0
 
 PRESSED: Final = 0.01
 """Position of the accelerator above its lowest from which a foot is on it [-]."""
-
-DRAGGED_SPEED: Final = 1.0
-"""Speed above which a reading shows a dragged engine [m/s]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -212,7 +207,7 @@ def _driven(drive: Drive, source: Signal) -> Floats:
     speed = drive.speed
     if speed is None:
         return source.values
-    return np.where(np.nan_to_num(speed.at(source.time)) > DRAGGED_SPEED, source.values, np.nan)
+    return np.where(np.nan_to_num(speed.at(source.time)) > MOVES, source.values, np.nan)
 
 
 def _slowing(recorded: Floats, need: Floats) -> Bools:
@@ -251,7 +246,7 @@ def _reach(floor: Floor, above: Floats) -> float:
     if known.size < FEWEST_IN_BIN:
         return 0.0
     shown = min(float(np.percentile(known, 90.0)), FARTHEST * floor.span)
-    return shown if shown > BEYOND * floor.scatter else 0.0
+    return shown if shown > SURE * floor.scatter else 0.0
 
 
 def _least(

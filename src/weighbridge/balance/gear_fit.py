@@ -8,9 +8,10 @@ import numpy as np
 
 from weighbridge.balance.table import ForceBalance
 from weighbridge.constants import CRUISE
+from weighbridge.limits import DRIVES, MANY
 from weighbridge.signals import Floats, scalar_from_si
 from weighbridge.vehicle import Vehicle
-from weighbridge.vehicle.gear import SLIPS, steady
+from weighbridge.vehicle.gear import steady
 
 NEAR: Final = 0.04
 """A ratio this near to a gearing belongs to it [-]: half the distance of close gears."""
@@ -18,9 +19,6 @@ NEAR: Final = 0.04
 ENOUGH: Final = 0.4
 """Part of the steady ratios that lies at a gearing. Gearings of another vehicle, a third
 apart, catch a quarter by chance; a file that lacks one of its gears keeps more than half [-]."""
-
-FEWEST_RATIOS: Final = 100
-"""Steady ratios needed to judge."""
 
 
 def share_on_gears(balance: ForceBalance, vehicle: Vehicle) -> float | None:
@@ -40,7 +38,7 @@ def share_on_gears(balance: ForceBalance, vehicle: Vehicle) -> float | None:
     if not _known(vehicle):
         return None
     time, ratio = held_ratios(balance)
-    if time.size < FEWEST_RATIOS:
+    if time.size < MANY:
         return None
     return _share(ratio, vehicle)
 
@@ -104,7 +102,7 @@ def held_ratios(balance: ForceBalance) -> tuple[Floats, Floats]:
     ratio : (n,) of ratios in 1/m
     """
     table, engine_speed = balance.table, balance.table.engine_speed
-    pulling = (table.speed > SLIPS) & (table.accel > 0.0) & (engine_speed > 0.0)
+    pulling = (table.speed > DRIVES) & (table.accel > 0.0) & (engine_speed > 0.0)
     ratio = np.where(pulling, engine_speed / np.where(pulling, table.speed, 1.0), 0.0)
     held = pulling & steady(table.time, ratio, np.full(ratio.size, 0.02))
     return table.time[held], np.log(ratio[held])

@@ -10,8 +10,9 @@ from typing import Final
 
 import numpy as np
 
-from weighbridge.balance.gear_fit import FEWEST_RATIOS, held_ratios
+from weighbridge.balance.gear_fit import held_ratios
 from weighbridge.balance.table import ForceBalance
+from weighbridge.limits import MANY, SOME
 from weighbridge.messages import Problem
 from weighbridge.signals import Bools, Floats
 from weighbridge.signals.instants import span
@@ -40,9 +41,6 @@ more lie on gearings, of a simulated car's 0.6 to 0.8 a gear step off."""
 PART: Final = 60.0
 """Parts of a drive this long are judged together [s]."""
 
-FEWEST_OF_PART: Final = 20
-"""Ratios that show a part."""
-
 OFF: Final = 0.3
 """Part of the ratios on gearings below which a part of a drive is off them [-]."""
 
@@ -61,7 +59,7 @@ def scale_contradiction(balance: ForceBalance, vehicle: Vehicle) -> Problem | No
     if gearings.size < 2:
         return None
     time, ratio = held_ratios(balance)
-    if time.size < FEWEST_RATIOS:
+    if time.size < MANY:
         return None
     scale, share, own = _best(ratio, gearings)
     if share > FITS and share > own + BETTER:
@@ -76,8 +74,8 @@ def _changing(time: Floats, ratio: Floats, gearings: Floats, name: str) -> Probl
     _, number = np.unique(time // PART, return_inverse=True)
     count = np.bincount(number)
     on = np.bincount(number, weights=_on(ratio, gearings, 2.0 * NEAR))
-    off = ((count >= FEWEST_OF_PART) & (on < OFF * count))[number]
-    if np.count_nonzero(off) < max(LEAST * off.size, FEWEST_RATIOS):
+    off = ((count >= SOME) & (on < OFF * count))[number]
+    if np.count_nonzero(off) < max(LEAST * off.size, MANY):
         return None
     scale, share, own = _best(ratio[off], gearings)
     # A gear that the file lacks is off, too; a scale moves several.

@@ -10,6 +10,7 @@ from weighbridge.balance.averaging import windows
 from weighbridge.balance.law import force_on_mass, mass_column
 from weighbridge.balance.table import ForceBalance
 from weighbridge.constants import GRAVITY, INDEPENDENT
+from weighbridge.limits import FEWEST_BLOCKS
 from weighbridge.messages import Problem, phrase
 from weighbridge.signals import UNITS
 from weighbridge.vehicle import Vehicle
@@ -29,9 +30,6 @@ heights in another unit."""
 
 ALIKE: Final = 0.35
 """A ratio is that of a unit within so much of its logarithm [-]: of the drives above within 0.3."""
-
-FEWEST_BLOCKS: Final = 5
-"""Fewer blocks show no standard deviation."""
 
 
 def height_scale(

@@ -8,6 +8,7 @@ import numpy as np
 
 from weighbridge.balance.force_balance import highest_torque
 from weighbridge.balance.table import ForceBalance
+from weighbridge.limits import CREEPS
 from weighbridge.messages import Problem
 from weighbridge.navigation import BY_SPEED
 from weighbridge.signals import Bools, Drive
@@ -17,9 +18,6 @@ from weighbridge.vehicle.gear import STANDS
 
 IDLE_TORQUE: Final = 0.05
 """Torque that a standing engine may show, over the highest of the drive [-]."""
-
-ROLLS: Final = 2.0
-"""Slower than this a vehicle may be pushed or creep [m/s]."""
 
 PULLS: Final = 0.3
 """Specific force from which something pulls [m/s^2]: rolling resistance and drag are more than
@@ -74,7 +72,7 @@ def _engine_stands(balance: ForceBalance) -> Bools:
     stands = (np.nan_to_num(table.engine_speed, nan=np.inf) < STANDS) & idle
     by_speed = balance.motion.source in BY_SPEED
     pulled = table.accel > GAINS if by_speed else table.specific_force > PULLS
-    return np.asarray(stands & pulled & (table.speed > ROLLS))
+    return np.asarray(stands & pulled & (table.speed > CREEPS))
 
 
 def _engine_beside(balance: ForceBalance, vehicle: Vehicle) -> bool:
@@ -82,7 +80,7 @@ def _engine_beside(balance: ForceBalance, vehicle: Vehicle) -> bool:
 
     Else it is that of the motor, which turns with the wheels.
     """
-    rolls = balance.table.speed > ROLLS
+    rolls = balance.table.speed > CREEPS
     stands = np.nan_to_num(balance.table.engine_speed, nan=np.inf)[rolls] < STANDS
     return vehicle.driveline.idle_speed > 0.0 or bool(np.sum(stands) > OFTEN * stands.size)
 
@@ -98,6 +96,6 @@ def _battery_share(drive: Drive) -> float:
     )
     if speed is None or not len(speed) or not np.median(volts.values) > TRACTION_VOLTAGE:
         return 0.0
-    moving = np.nan_to_num(speed.at(amps.time)) > ROLLS
+    moving = np.nan_to_num(speed.at(amps.time)) > CREEPS
     power = np.nan_to_num(volts.at(amps.time) * amps.values)[moving]
     return float(np.mean(np.abs(power) > MOTOR_POWER)) if power.size else 0.0

@@ -15,12 +15,12 @@ from weighbridge.constants import GRAVITY
 from weighbridge.kernels.first_order import even_lag
 from weighbridge.kernels.interpolation import mixed, shares
 from weighbridge.kernels.lowpass import lowpass_even
+from weighbridge.limits import LOCKED
 from weighbridge.navigation import BY_SPEED, Motion
 from weighbridge.navigation.motion import nearest_row, row_before
 from weighbridge.signals import Bools, Drive, Floats, Ints, Signal
 from weighbridge.signals.runs import marked_runs
 from weighbridge.vehicle import (
-    UNSLIPPED,
     Vehicle,
     effective_gearing,
     find_engine_delay,
@@ -267,7 +267,7 @@ def gears_at(
         if vehicle.driveline.gearing_range is not None:
             low, high = vehicle.driveline.gearing_range
             inside = (ratio > low / BEYOND_RANGE) & (ratio < high * BEYOND_RANGE)
-            slipping = (speed < UNSLIPPED) | ~inside
+            slipping = (speed < LOCKED) | ~inside
         return np.zeros(recorded.size, dtype=np.int64), ratio, slipping
     gear, mismatch = predict_gear(engine_speed, speed, gearings)
     measured: Signal | None = drive.get("gear")

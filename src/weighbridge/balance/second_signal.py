@@ -16,33 +16,21 @@ import numpy as np
 from scipy.ndimage import median_filter
 
 from weighbridge.errors import DriveError
+from weighbridge.limits import CREEPS, LOCKED, PARTS, SOME
 from weighbridge.signals import Bools, Drive, Floats, Ints, Signal, robust_fit, robust_fits
-from weighbridge.signals.correlation import correlations
 from weighbridge.signals.interpolation import interpolate
+from weighbridge.signals.lag import best_lag
 from weighbridge.vehicle import SecondSignalRelation, Vehicle, source_of
 from weighbridge.vehicle.air import standard_pressure
 
 WINDOW: Final = 3.0
 """Both sides are averaged over so long, at least three periods of the slowest signal [s]."""
 
-SLOWEST: Final = 2.0
-"""The vehicle drives faster while the engine's second signals are learnt [m/s]."""
-
-SLOWEST_MOTOR: Final = 6.0
-"""Battery power over motor speed says little of the torque below this vehicle speed [m/s]."""
-
-DELAYS: Final = tuple(float(d) for d in np.arange(-1.0, 1.51, 0.25))
+DELAYS: Final = np.arange(-1.0, 1.51, 0.25)
 """Delays of the reading against its second signal that are tried [s]."""
 
 SLOW_PERIOD: Final = 1.0
 """Signals sampled more slowly show no delay [s]."""
-
-BLOCKS: Final = 12
-"""Parts of a drive that are left out one after another for a standard deviation."""
-
-FEWEST_MEANS: Final = 40
-"""Means from which a drive, or a part of it, can be judged."""
-
 
 Ranges: TypeAlias = tuple[tuple[float, float], tuple[float, float]]
 """Lowest and highest value of a second signal [SI], and speed of the engine [rad/s]."""
@@ -200,7 +188,7 @@ def rows_of(
     if drive.missing((name, *second_signal.needs)) or turning_of is None or speed is None:
         return None
     used = [drive.signals[n] for n in (name, *second_signal.needs)] + [turning_of, speed]
-    if min(map(len, used)) < FEWEST_MEANS:
+    if min(map(len, used)) < SOME:
         return None
     time = drive.signals[name].time
     try:
@@ -214,7 +202,7 @@ def rows_of(
     turning = steady.at(moved) * gearing
     value = second_signal.of(drive, moved, turning)
     driving = np.isfinite(reading) & np.isfinite(value) & np.isfinite(turning)
-    least = SLOWEST_MOTOR if motor else SLOWEST
+    least = LOCKED if motor else CREEPS
     driving &= np.nan_to_num(speed.at(moved)) > least
     for signal in used[1:]:
         driving &= signal.age(moved) <= 2.0 * signal.period
@@ -283,12 +271,12 @@ def compare(reading: Floats, predicted: Floats) -> Comparison:
     columns = np.column_stack([predicted - middle, np.ones_like(predicted)])
     scale, level = robust_fit(columns, reading)[0]
     # Each is fitted anew: which of two clusters of rows is the outlier may depend on one part.
-    size = -(-reading.size // BLOCKS)
-    begin = (np.arange(BLOCKS) * (reading.size - size)) // (BLOCKS - 1)
+    size = -(-reading.size // PARTS)
+    begin = (np.arange(PARTS) * (reading.size - size)) // (PARTS - 1)
     rows = np.arange(reading.size - size)
     others = rows + size * (rows >= begin[:, None])
     left_out = robust_fits(columns[others], reading[others])[0]
-    spread = (BLOCKS - 1) / BLOCKS * np.sum((left_out - np.mean(left_out, 0)) ** 2, 0)
+    spread = (PARTS - 1) / PARTS * np.sum((left_out - np.mean(left_out, 0)) ** 2, 0)
     scale_std, level_std = np.sqrt(spread)
     return Comparison(float(scale), float(level), middle, float(scale_std), float(level_std))
 
@@ -305,9 +293,10 @@ def lateness(
 
     Returns
     -------
-    One of `DELAYS`; None where the signals are sampled too slowly, or the drive is too short.
+    NaN where it is beyond `DELAYS`; None where the signals are sampled too slowly, or the drive
+    is too short.
     """
-    if rows.period > SLOW_PERIOD or np.count_nonzero(rows.driving) < 10 * FEWEST_MEANS:
+    if rows.period > SLOW_PERIOD or np.count_nonzero(rows.driving) < 10 * SOME:
         return None
     value = np.clip(rows.value, *relation.value_range)
     turning = np.clip(rows.turning, *relation.speed_range)
@@ -316,7 +305,7 @@ def lateness(
     )
     driven = rows.time[rows.driving]
     moved = (interpolate(driven - delay, rows.time, predicted) for delay in DELAYS)
-    return DELAYS[int(np.argmax(np.square(correlations(rows.reading[rows.driving], moved))))]
+    return best_lag(rows.reading[rows.driving], moved, DELAYS).at
 
 
 def air_of(drive: Drive, start: float, end: float) -> tuple[float, float]:

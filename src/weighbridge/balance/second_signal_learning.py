@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final, NamedTuple
@@ -10,7 +11,6 @@ import numpy as np
 
 from weighbridge.balance.disagreement import accepted_scales, difference, judged
 from weighbridge.balance.second_signal import (
-    FEWEST_MEANS,
     SECOND_SIGNALS,
     Rows,
     SecondSignal,
@@ -21,6 +21,7 @@ from weighbridge.balance.second_signal import (
     ranges_of,
     rows_of,
 )
+from weighbridge.limits import MANY, SOME
 from weighbridge.messages import Problem
 from weighbridge.signals import Drive, Floats, robust_fit, spread
 from weighbridge.vehicle import SecondSignalRelation, Vehicle, source_of
@@ -40,9 +41,6 @@ FINEST: Final = 0.005
 
 STRAY: Final = 0.1
 """Where a larger part of the means is of another state, a second signal shows nothing [-]."""
-
-FEWEST_LEARNT: Final = 100
-"""Means from which a relation is learnt: five minutes of pulling."""
 
 SCATTERED: Final = 0.06
 """A second signal about whose relation the reading scatters by more than this part of its range is
@@ -141,7 +139,7 @@ def contradiction(
             continue
         for j, second in enumerate(rows):
             part = means(second, second_signal, ranges_of(relation))
-            if i == j or part.time.size < FEWEST_MEANS:
+            if i == j or part.time.size < SOME:
                 continue
             accepted = accepted_scales(source, relation, airs[j])
             finding = judged(part, relation, accepted)
@@ -171,7 +169,7 @@ def learn(
     """
     value = np.concatenate([r.value[r.driving] for r in rows])
     turning = np.concatenate([r.turning[r.driving] for r in rows])
-    if value.size < FEWEST_LEARNT:
+    if value.size < MANY:
         return None
     low, high = np.percentile(value, [1.0, 99.0])
     slow, fast = np.percentile(turning, [1.0, 99.0])
@@ -182,7 +180,7 @@ def learn(
         parts = [means(r, second_signal, (ends, speed_range)) for r in rows]
         reading = np.concatenate([p.reading for p in parts])
         columns = np.vstack([p.terms for p in parts])
-        if reading.size < FEWEST_LEARNT:
+        if reading.size < MANY:
             continue
         if best is not None and best.strays_below(columns, reading):
             break
@@ -212,5 +210,6 @@ def learn(
         pressure=pressure,
         temperature=temperature,
     )
-    lags = [lag for r in rows if (lag := lateness(r, second_signal, relation)) is not None]
+    found_lags = [lateness(r, second_signal, relation) for r in rows]
+    lags = [lag for lag in found_lags if lag is not None and math.isfinite(lag)]
     return replace(relation, lag=float(np.median(lags))) if lags else relation

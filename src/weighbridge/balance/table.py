@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from weighbridge.balance.coarse import coarse_note
 from weighbridge.balance.filled import Fill
 from weighbridge.balance.foot_setup import FootSetup
+from weighbridge.limits import STANDS
 from weighbridge.messages import Problem
 from weighbridge.navigation import Motion
 from weighbridge.signals import Bools, Floats, Ints
@@ -21,9 +22,6 @@ from weighbridge.vehicle.air import dynamic_pressure
 
 if TYPE_CHECKING:
     from weighbridge.navigation.identify.setup import Setup
-
-MOVING: Final = 0.5
-"""Slower a vehicle stands [m/s]."""
 
 UNKNOWN_AIR: Final = 0.02
 """What the air leaves uncertain of the torque is reported from here on [-]."""
@@ -134,7 +132,7 @@ class ForceTable:
     @property
     def moving(self) -> Bools:
         """Rows at which the vehicle does not stand (n,)."""
-        return np.asarray(np.nan_to_num(self.speed) > MOVING)
+        return np.asarray(np.nan_to_num(self.speed) > STANDS)
 
     @property
     def usable(self) -> Bools:

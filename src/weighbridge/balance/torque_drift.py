@@ -16,23 +16,19 @@ from weighbridge.balance.force_balance import force_balance
 from weighbridge.balance.law import drag_force
 from weighbridge.balance.table import ForceBalance, ForceTable
 from weighbridge.errors import DriveError
+from weighbridge.limits import CERTAIN, FEWEST_PIECES, MANY
 from weighbridge.messages import Problem, phrase, refused
 from weighbridge.navigation import BY_SPEED, Motion
 from weighbridge.signals import Drive, Floats, Signal, median_of_three, median_slope, spread
 from weighbridge.signals.interpolation import interpolate
+from weighbridge.signals.lag import best_lag
 from weighbridge.vehicle import Vehicle, source_of
 
 PIECE: Final = 240.0
 """Force and motion are compared over so long [s], every half of it anew."""
 
-SHIFTS: Final = 0.2 * np.arange(-10, 41)
+SHIFTS: Final[Floats] = 0.2 * np.arange(-10.0, 41.0)
 """Lags that are tried [s]."""
-
-FEWEST_ROWS: Final = 150
-"""Fewer usable rows of a piece show no lag."""
-
-FEWEST_PARTS: Final = 4
-"""Fewer pieces show no drift."""
 
 AGREES: Final = 0.85
 """Correlation of force and specific force from which on a lag is believed [-]: simulated drives had
@@ -42,9 +38,6 @@ undamaged diesel scatter by 0.3 s: with 0.7 two of its drives in the corpus were
 DRIFTS: Final = 0.3
 """Smaller changes over a drive are left [s]: the lags of the pieces of twelve undamaged drives
 stayed within 0.22 s."""
-
-SURE: Final = 5.0
-"""Scatters of a piece's lag by which it has to change as well [-]."""
 
 WANDERS: Final = 0.8
 """A lag that changes by more, in no even way, is no clock [s]."""
@@ -75,31 +68,17 @@ def force_lags(table: ForceTable, vehicle: Vehicle, motion: Motion) -> ForceLags
     for begin in np.arange(table.time[0], table.time[-1] - 0.5 * PIECE, 0.5 * PIECE):
         first, last = np.searchsorted(table.time, (begin, begin + PIECE))
         here = np.flatnonzero(usable[first:last]) + first
-        if here.size < FEWEST_ROWS:
+        if here.size < MANY:
             continue
         moved = interpolate(table.time[here] - SHIFTS[:, None], motion.time, specific)
         whole = np.isfinite(moved).all(axis=0)
-        if np.count_nonzero(whole) < FEWEST_ROWS:
+        if np.count_nonzero(whole) < MANY:
             continue
-        lag = _best(force[here][whole], moved[:, whole])
-        if np.isfinite(lag):
-            found.append((float(begin) + 0.5 * PIECE, lag))
+        lag = best_lag(force[here][whole], moved[:, whole], SHIFTS)
+        if np.isfinite(lag.at) and lag.correlation >= AGREES:
+            found.append((float(begin) + 0.5 * PIECE, lag.at))
     time, lags = np.array(found).reshape(-1, 2).T
     return ForceLags(time, lags)
-
-
-def _best(force: Floats, moved: Floats) -> float:
-    """Lag at which a force (n,) goes best with specific force (s, n) [s]; NaN where none does."""
-    force = force - force.mean()
-    moved = moved - moved.mean(axis=1, keepdims=True)
-    size = np.sqrt(np.sum(moved**2, axis=1) * (force @ force))
-    score = np.divide(moved @ force, size, out=np.zeros_like(size), where=size > 0.0)
-    k = int(np.argmax(score))
-    if k in (0, SHIFTS.size - 1) or score[k] < AGREES:
-        return float("nan")
-    before, best, after = score[k - 1 : k + 2]
-    step = 0.5 * (before - after) / (before - 2.0 * best + after)
-    return float(SHIFTS[k] + step * (SHIFTS[1] - SHIFTS[0]))
 
 
 def smoothed_steps(
@@ -130,8 +109,8 @@ def smoothed_steps(
     before = force_lags(balance.table, vehicle, motion)
     slope, scatter = _line(before)
     reach = float(np.ptp(before.time)) if before.time.size else 0.0
-    if abs(slope) * reach <= max(DRIFTS, SURE * scatter):
-        if before.lag.size >= FEWEST_PARTS and np.ptp(median_of_three(before.lag)) > WANDERS:
+    if abs(slope) * reach <= max(DRIFTS, CERTAIN * scatter):
+        if before.lag.size >= FEWEST_PIECES and np.ptp(median_of_three(before.lag)) > WANDERS:
             raise _wanders(drive, carrier, before)
         return drive, (), balance
     moved = carrier.time - slope * (carrier.time - before.time[0])
@@ -139,7 +118,7 @@ def smoothed_steps(
     corrected = drive.with_signals(Signal(carrier.name, moved[rising], carrier.values[rising]))
     balance = force_balance(corrected, vehicle, motion, delay=balance.delay)
     after = force_lags(balance.table, vehicle, motion)
-    if after.lag.size >= FEWEST_PARTS and np.ptp(median_of_three(after.lag)) > WANDERS:
+    if after.lag.size >= FEWEST_PIECES and np.ptp(median_of_three(after.lag)) > WANDERS:
         raise _wanders(drive, carrier, before)
     grows = phrase("later_and_later" if slope > 0.0 else "earlier_and_earlier")
     note = Problem.of(
@@ -155,7 +134,7 @@ def _wanders(drive: Drive, carrier: Signal, found: ForceLags) -> DriveError:
 
 def _line(found: ForceLags) -> tuple[float, float]:
     """Robust slope of the lag over time [-] and scatter of a piece about the line [s]."""
-    if found.lag.size < FEWEST_PARTS:
+    if found.lag.size < FEWEST_PIECES:
         return 0.0, 0.0
     slope = median_slope(found.time, found.lag)
     left = found.lag - slope * found.time

@@ -8,6 +8,7 @@ import numpy as np
 
 from weighbridge.balance.table import ForceTable
 from weighbridge.constants import GRAVITY
+from weighbridge.limits import SURER
 from weighbridge.signals import Drive, Floats
 
 AROUND: Final = 0.5
@@ -16,9 +17,6 @@ the steps of an engine speed."""
 
 SLOWEST: Final = 4.0
 """Slower, a receiver's noise is as large as any slip [m/s]."""
-
-APART: Final = 4.0
-"""Fixes farther from the line, in standard deviations, are left out [-]."""
 
 FEWEST: Final = 60
 """Fixes that show a slip, at least; a minute at 1 Hz."""
@@ -93,7 +91,7 @@ def wheel_slip(table: ForceTable, mass: float, drive: Drive) -> WheelSlip | None
             return None
         left = (y - columns @ found) * weight
         noise = 1.4826 * float(np.median(np.abs(left[used])))
-        taken, used = used, np.abs(left) < APART * noise
+        taken, used = used, np.abs(left) < SURER * noise
     a = columns[taken] * weight[taken, None]
     cov = noise**2 * np.linalg.inv(a.T @ a)
     std, late_std = np.sqrt(cov[1, 1]), np.sqrt(cov[2, 2])

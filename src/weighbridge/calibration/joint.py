@@ -9,8 +9,7 @@ from typing import Final
 import numpy as np
 
 from weighbridge.balance.braking import retarder_unreported
-from weighbridge.balance.delay import FARTHEST as FARTHEST_DELAY
-from weighbridge.balance.delay import beyond, vertex
+from weighbridge.balance.delay import FARTHEST
 from weighbridge.calibration.fitted import (
     Fitted,
     check_delay,
@@ -41,11 +40,13 @@ from weighbridge.calibration.self_weighing import (
 from weighbridge.estimators import joint
 from weighbridge.estimators.joint.problem import UNMODELLED
 from weighbridge.estimators.track import MassTrack
+from weighbridge.limits import CERTAIN
 from weighbridge.messages import Problem as Message
 from weighbridge.messages import phrase, refused
 from weighbridge.navigation import BY_SPEED
 from weighbridge.results import DelaySearch
 from weighbridge.signals import Floats
+from weighbridge.signals.lag import beyond, lowest, parabola
 from weighbridge.vehicle import Driveline, Provenance, RoadLoad, Timing, Vehicle, cold_torque_std
 
 LAGS: Final = (0.0, 0.1, 0.2, 0.3, 0.4)
@@ -82,10 +83,6 @@ TIMING_SAMPLES: Final = 1.2
 
 MOST: Final = np.array([19.0, 0.09, np.inf, np.inf])
 """Drag area [m^2], rolling coefficient [-] and inertias that a vehicle file can hold, about."""
-
-FARTHEST: Final = 5.0
-"""Standard deviations of its class by which a fitted road load may be off [-]: farther ones were
-seen without an accelerometer, where hills and torque noise pass for drag."""
 
 ROUGH_NOISE: Final = 0.05
 """Noise of the torque over the highest of the motion, until a fit has shown it [-]."""
@@ -204,7 +201,7 @@ def _refuse_strange(
     slope = _driven_slope(problem, found, rows)
     refuse_nonsense(problem, *slope)
     mean, std = settings.prior
-    if np.any(np.abs(found.road - mean)[:2] > FARTHEST * std[:2]):
+    if np.any(np.abs(found.road - mean)[:2] > CERTAIN * std[:2]):
         refuse_diesel_air(problem, *slope)
         raise _NoRoadLoad(
             phrase(
@@ -409,53 +406,37 @@ def find_timing(
     totals = np.array(DELAYS)
     scores = misfits([(float(t) - USUAL_LAG, USUAL_LAG) for t in totals])
     while int(np.argmin(scores)) in (0, totals.size - 1):
-        more = beyond(totals, scores, DELAYS[1] - DELAYS[0], FARTHEST_DELAY)
+        more = beyond(totals, scores, FARTHEST)
         if not more.size:
             break
         totals = np.sort(np.concatenate([totals, more]))
         scores = misfits([(float(t) - USUAL_LAG, USUAL_LAG) for t in totals])
     # At the ends both sides have little in common, and little to disagree about.
-    lowest = [k for k in range(1, totals.size - 1) if scores[k] <= min(scores[k - 1 : k + 2])]
+    low = [k for k in range(1, totals.size - 1) if scores[k] <= min(scores[k - 1 : k + 2])]
     coarse = scores
-    total = float(totals[min(lowest, key=lambda k: scores[k])]) if lowest else USUAL_DELAY
+    total = float(totals[min(low, key=lambda k: scores[k])]) if low else USUAL_DELAY
 
     tried = total + np.array(SHIFTS)
     pairs = [(float(t) - lag, lag) for lag in given for t in tried]
     by_lag = misfits(pairs).reshape(len(given), len(SHIFTS))
-    lowest_at = [_lowest(tried, each) for each in by_lag]
+    lowest_at = [lowest(tried, each) for each in by_lag]
     lags = np.array(given)
     unusual = 0.5 * np.square(UNMODELLED * (lags - USUAL_LAG) / LAG_SPREAD)
-    lag, _ = _lowest(lags, np.array([misfit for _, misfit in lowest_at]) + unusual)
+    lag, _ = lowest(lags, np.array([misfit for _, misfit in lowest_at]) + unusual)
     delay = float(np.interp(lag, given, [where for where, _ in lowest_at])) - lag
     delays = np.asarray(delay + 0.03 * np.arange(-4, 5), dtype=np.float64)
     scores = misfits([(float(d), lag) for d in delays])
     best = int(np.clip(np.argmin(scores), 1, delays.size - 2))
-    around = slice(best - 1, best + 2)
-    delay = vertex(delays[around], scores[around])
+    near = slice(best - 1, best + 2)
+    delay = parabola(delays[near], scores[near]).at
+    # The misfit is the logarithm of a likelihood. Over three of them its bend is rough.
+    bend = parabola(delays, scores).bend
     search = DelaySearch(
-        delay=totals, misfit=coarse - coarse.min(), std=_delay_std(delays[around], scores[around])
+        delay=totals,
+        misfit=coarse - coarse.min(),
+        std=float(UNMODELLED / np.sqrt(bend)) if bend > 0.0 else None,
     )
-    return delay, lag, bool(lowest), search
-
-
-def _lowest(x: Floats, y: Floats) -> tuple[float, float]:
-    """Lowest point of values on an even grid, between its points by a parabola."""
-    near = int(np.argmin(y))
-    if near in (0, x.size - 1):
-        return float(x[near]), float(y[near])
-    around = slice(near - 1, near + 2)
-    at = vertex(x[around], y[around])
-    low, middle, high = y[around]
-    part = (at - float(x[near])) / float(x[1] - x[0])
-    bend = 0.5 * (low - 2.0 * middle + high)
-    return at, float(middle + 0.5 * (high - low) * part + bend * part**2)
-
-
-def _delay_std(delays: Floats, misfits: Floats) -> float | None:
-    """Standard deviation of a delay by the curvature of its likelihood [s]; None if flat."""
-    step = delays[1] - delays[0]
-    curvature = (misfits[0] - 2.0 * misfits[1] + misfits[2]) / step**2
-    return float(UNMODELLED / np.sqrt(curvature)) if curvature > 0.0 else None
+    return delay, lag, bool(low), search
 
 
 def _with(draft: Vehicle, found: InverseFit, settings: FitSettings) -> Vehicle:

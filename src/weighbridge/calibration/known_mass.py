@@ -14,6 +14,7 @@ from weighbridge.constants import PETROL_HEATING_VALUE
 from weighbridge.errors import ConfigError
 from weighbridge.estimators import joint
 from weighbridge.estimators.joint.problem import UNMODELLED
+from weighbridge.limits import SURE, SURER
 from weighbridge.messages import Problem, phrase, refused
 from weighbridge.signals import Drive, Floats
 from weighbridge.vehicle import VEHICLE_CLASSES, Vehicle, scale_std, source_of
@@ -29,7 +30,7 @@ LIGHTEST: Final = 0.9
 OVERLOAD: Final = 1.25
 """Largest mass over the permitted one [-]."""
 
-SURE: Final = 0.3
+FAR: Final = 0.3
 """Scale of a measured torque that is off by more is the mass's fault [-]: makers allow torque
 5 %, and their reference torques were found 15 % off."""
 
@@ -40,16 +41,10 @@ flow and its ratio: the best engines have as much at their best point, and nothi
 DRAG_FAR: Final = 2.5
 """Standard deviations of the class from which a drag area is reported [-]."""
 
-QUESTIONABLE: Final = 3.0
-"""Standard deviations from which such a scale is reported [-]."""
-
 UNCERTAIN: Final = 0.06
 """A drive that weighs so much more or less than the others, by the file made of all, is reported
 [-]: of nine simulated vehicles the farthest of three drives was 0.03 off, with one mass of three
 20 % off 0.21 to 0.32."""
-
-SIGNIFICANT: Final = 4.0
-"""Standard deviations by which it has to be off as well [-]."""
 
 OVER: Final = 1.02
 """Mass over the permitted one from which it is reported [-]."""
@@ -137,7 +132,7 @@ def scale_finding(vehicle: Vehicle, masses: list[float], names: str) -> Problem 
         No torque is so far off.
     """
     ratio, std = scale_by_mass(vehicle), scale_std(vehicle)
-    if abs(ratio - 1.0) <= QUESTIONABLE * std:
+    if abs(ratio - 1.0) <= SURE * std:
         return None
     listed = " and ".join(f"{kg:.0f}" for kg in masses)
     likely = " and ".join(f"{kg / ratio:.0f}" for kg in masses)
@@ -148,7 +143,7 @@ def scale_finding(vehicle: Vehicle, masses: list[float], names: str) -> Problem 
         "std": 200.0 * std,
         "likely": likely,
     }
-    if abs(np.log(ratio)) > SURE:
+    if abs(np.log(ratio)) > FAR:
         pounds = " and ".join(f"{kg * POUND:.0f}" for kg in masses)
         hint = phrase("as_pounds", pounds=pounds) if 1.9 < ratio < 2.5 else ""
         raise refused("calibration.scale_wrong", **found, hint=hint)
@@ -291,7 +286,7 @@ def contradicting(
         mean = float(np.average(ratios[others], weights=weight))
         std = float(np.hypot(stds[k], 1.0 / np.sqrt(weight.sum())))
         apart = float(ratios[k]) / mean - 1.0
-        off[k] = apart if abs(apart) > SIGNIFICANT * std else 0.0
+        off[k] = apart if abs(apart) > SURER * std else 0.0
     worst = int(np.argmax(np.abs(off)))
     if abs(off[worst]) <= UNCERTAIN:
         return []

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from numbers import Real
-from typing import Final
 
 import numpy as np
 
@@ -19,6 +18,7 @@ from weighbridge.calibration.settings import CalibrationSettings
 from weighbridge.checks import correct_drive, refuse_serious
 from weighbridge.errors import ConfigError
 from weighbridge.estimators.squat import pooled, squat_at
+from weighbridge.limits import FEW, MANY
 from weighbridge.messages import refused
 from weighbridge.navigation import BY_SPEED, Motion, find_motion, with_squat, without_accelerometer
 from weighbridge.signals import Drive, Floats
@@ -41,12 +41,6 @@ from weighbridge.vehicle import (
     stepless_range,
 )
 from weighbridge.vehicle.as_read import as_read
-
-FEWEST_REPORTED: Final = 10
-"""Samples of a gear below which a gear signal may be in error there."""
-
-FEW_READINGS: Final = 200
-"""Fewer readings of engine speed show no curve of the torque over it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -96,7 +90,7 @@ class Problem:
         ----------
         turning : (n,) engine speeds of the usable rows [rad/s]
         """
-        if self.draft.driveline.single_speed or turning.size < FEW_READINGS:
+        if self.draft.driveline.single_speed or turning.size < MANY:
             return ()
         slow, fast = np.percentile(turning, [1.0, 99.0])
         return knots_between(float(slow), float(fast))
@@ -348,7 +342,7 @@ def _reported_gears(drives: Sequence[Drive]) -> int:
         if signal is None:
             return 0
         value, count = np.unique(signal.values[signal.values > 0.0], return_counts=True)
-        gears |= set(value[count >= FEWEST_REPORTED].tolist())
+        gears |= set(value[count >= FEW].tolist())
     return len(gears)
 
 

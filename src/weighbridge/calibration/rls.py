@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from weighbridge.balance import ForceBalance, Reason, best_delay
-from weighbridge.balance.delay import delay_std
+from weighbridge.balance import ForceBalance, Reason
+from weighbridge.balance.delay import EARLIEST, FARTHEST, LATEST
 from weighbridge.balance.law import ROAD_PARAMETERS
 from weighbridge.calibration.fitted import (
     Fitted,
@@ -37,6 +38,7 @@ from weighbridge.messages import Problem as Message
 from weighbridge.messages import phrase, refused
 from weighbridge.results import DelaySearch
 from weighbridge.signals import Floats
+from weighbridge.signals.lag import find_lag, lag_std_at
 from weighbridge.vehicle import (
     Driveline,
     Provenance,
@@ -59,8 +61,8 @@ def fit_rls(problem: Problem) -> Fitted:
     """
     draft = problem.draft
     low, high = _bounds(problem.base, draft.driveline)
-    search = _Search(problem, low, high)
-    delay = best_delay(search.misfit)
+    tried = _Search(problem, low, high)
+    delay = find_lag(tried.misfit, EARLIEST, LATEST, farthest=FARTHEST)
     found = bool(np.isfinite(delay))
     if not found:
         delay = problem.base.timing.torque_delay or 0.0
@@ -69,7 +71,9 @@ def fit_rls(problem: Problem) -> Fitted:
     joined = torque_rows_of(problem, rows)
     fitted = fit(joined, low, high)
     refuse_nonsense(problem, *driven_slope(fitted, joined, curved=problem.curved))
-    spread = delay_std(search.misfit, delay, fitted.independent_rows) if found else float("nan")
+    spread = math.inf
+    if found:
+        spread = lag_std_at(lambda at: tried.misfit(at) ** 2, delay, fitted.independent_rows)
     speeds, loads = ranges(problem, rows)
     vehicle = replace(
         draft,
@@ -84,7 +88,7 @@ def fit_rls(problem: Problem) -> Fitted:
         road_load=_fitted_road_load(fitted),
         timing=Timing(
             torque_delay=delay if found else problem.base.timing.torque_delay,
-            torque_delay_std=spread if np.isfinite(spread) else None,
+            torque_delay_std=spread if math.isfinite(spread) else None,
         ),
         provenance=Provenance(masses=tuple(problem.masses), method=RLS.name),
     )
@@ -103,7 +107,7 @@ def fit_rls(problem: Problem) -> Fitted:
     return Fitted(
         vehicle=_self_weighed(problem, vehicle, fitted, held),
         rows=rows,
-        search=search.result(fitted.independent_rows),
+        search=tried.result(fitted.independent_rows),
         held=held,
         notes=notes,
     )

@@ -6,6 +6,7 @@ from typing import Final
 
 import numpy as np
 
+from weighbridge.limits import DRIVES, FEW
 from weighbridge.signals import Drive, Floats, Problem, Signal
 
 NAME: Final = "longitudinal_accel"
@@ -13,12 +14,6 @@ NAME: Final = "longitudinal_accel"
 SPAN: Final = 30.0
 """Acceleration and speed are compared over so long: rounding and smoothing of a speed lie below
 0.01 m/s^2 then [s]."""
-
-FEWEST: Final = 10
-"""Spans in motion that are enough to judge."""
-
-SLOWEST: Final = 3.0
-"""Mean speed of a span in motion, at least [m/s]."""
 
 ALIKE: Final = 0.008
 """Root mean square of the difference of both, at most: 0.0013 of a derivative of the same speed,
@@ -43,7 +38,7 @@ def without_derived(drive: Drive) -> Drive:
         if speed is None or len(speed) < 2:
             continue
         difference = _difference(accel, speed)
-        rms = float(np.sqrt(np.mean(difference**2))) if difference.size >= FEWEST else np.inf
+        rms = float(np.sqrt(np.mean(difference**2))) if difference.size >= FEW else np.inf
         if rms < ALIKE:
             found = Problem.of("imu.derived", NAME, speed=name, rms=rms, span=SPAN)
             return drive.without(NAME).with_problems(found)
@@ -60,7 +55,7 @@ def _difference(accel: Signal, speed: Signal) -> Floats:
     gained = np.diff(np.interp(edges, accel.time, _integral(accel)))
     changed = np.diff(np.interp(edges, speed.time, speed.values))
     way = np.diff(np.interp(edges, speed.time, _integral(speed)))
-    return np.asarray((gained - changed)[way > SLOWEST * SPAN] / SPAN)
+    return np.asarray((gained - changed)[way > DRIVES * SPAN] / SPAN)
 
 
 def _integral(signal: Signal) -> Floats:

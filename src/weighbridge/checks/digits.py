@@ -6,6 +6,7 @@ from typing import Final
 
 import numpy as np
 
+from weighbridge.limits import MANY, MOVES
 from weighbridge.signals import Bools, Drive, Floats, Problem, Signal, resolution
 from weighbridge.signals.catalogue import IMU_SIGNALS
 from weighbridge.signals.interpolation import interpolate
@@ -21,12 +22,6 @@ TWICE: Final = 1.6
 FLAT: Final = 1.8
 """Samples at the first steps over those at the second ones: more are a peak of their own [-]."""
 
-FEWEST: Final = 200
-"""Samples at each of the first steps that are enough to judge [-]."""
-
-MOVES: Final = 1.0
-"""Slower, an axis may rest at zero [m/s]."""
-
 
 def with_half_digits(drive: Drive) -> Drive:
     """Add half a digit to an accelerometer whose digits are cut off towards zero.
@@ -34,7 +29,7 @@ def with_half_digits(drive: Drive) -> Drive:
     Such digits make every push smaller by half a digit, whichever way it goes: the sensor is dead
     about zero. It shows in a step at zero that is twice as wide as the others.
     """
-    axes = [s for name in IMU_SIGNALS[:3] if (s := drive.get(name)) is not None and len(s) > FEWEST]
+    axes = [s for name in IMU_SIGNALS[:3] if (s := drive.get(name)) is not None and len(s) > MANY]
     steps = {s.name: resolution(s.values) for s in axes}
     step = float(np.median(list(steps.values()))) if steps else 0.0
     if step <= 0.0:
@@ -69,7 +64,7 @@ def _cut(values: Floats, step: float) -> bool:
     second, first, zero, next_first, next_second = (
         np.count_nonzero(place == k) for k in (-2, -1, 0, 1, 2)
     )
-    if min(first, next_first) < FEWEST:
+    if min(first, next_first) < MANY:
         return False
     beside = first + next_first
     return bool(2.0 * zero > TWICE * beside and beside < FLAT * (second + next_second))

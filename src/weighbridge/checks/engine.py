@@ -9,6 +9,7 @@ import numpy as np
 
 from weighbridge.checks import windows
 from weighbridge.checks.needed import needed, of_torque, show
+from weighbridge.limits import CREEPS, SOME
 from weighbridge.messages import phrase
 from weighbridge.signals import Drive, Problem, Signal
 from weighbridge.signals.correlation import correlation
@@ -26,10 +27,8 @@ _IDLE_TORQUE: Final = 0.03
 
 # Signals of the battery have signs of their own.
 _OF_BATTERY: Final = ("battery_current", "battery_power", "battery_voltage")
-# Torque and gain of speed are compared over windows of so long [s], where it is so fast [m/s].
+# Torque and gain of speed are compared over windows of so long [s].
 _SIGN_WINDOW: Final = 1.0
-_SIGN_SPEED: Final = 2.0
-_SIGN_FEWEST: Final = 30
 # Correlation below which the torque has the other sign: -0.9 in a reversed one.
 _AGAINST: Final = -0.5
 
@@ -48,8 +47,8 @@ def check_torque_sign(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem
         )
         force, full = windows.means(s, at)
         gained = np.diff(speed.at(at))
-        moving = full & (speed.age(at[1:]) < 1.0) & (speed.at(at[1:]) > _SIGN_SPEED)
-        if np.count_nonzero(moving) < _SIGN_FEWEST:
+        moving = full & (speed.age(at[1:]) < 1.0) & (speed.at(at[1:]) > CREEPS)
+        if np.count_nonzero(moving) < SOME:
             continue
         if correlation(force[moving], gained[moving]) < _AGAINST:
             yield Problem.of("torque.sign", name, serious=True)

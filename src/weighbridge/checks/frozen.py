@@ -10,9 +10,10 @@ from typing import Final
 
 import numpy as np
 
+from weighbridge.limits import DRIVES
 from weighbridge.signals import Bools, Drive, Floats, Signal
 from weighbridge.signals.runs import Runs, runs_of
-from weighbridge.vehicle.gear import SLIPS, STANDS
+from weighbridge.vehicle.gear import STANDS
 
 SHORTEST: Final[dict[str, float]] = {"engine_speed": 10.0, "vehicle_speed": 20.0}
 """Runs of one value below may be a steady drive [s]."""
@@ -121,7 +122,7 @@ def _impossible(drive: Drive, signal: Signal, part: slice, levels: frozenset[flo
         return _speed_frozen(drive, grid, value)
     speed = _speed(drive, grid)
     if signal.name == "engine_speed":
-        moving = speed[speed > SLIPS]
+        moving = speed[speed > DRIVES]
         idle = _idle(drive, signal)
         return bool(
             value > max(IDLING * idle, STANDS)
@@ -141,9 +142,9 @@ def _impossible(drive: Drive, signal: Signal, part: slice, levels: frozenset[flo
         low, high, reach = EXTREME
         return bool(accel.min() < low and accel.max() > high and np.ptp(speed[known]) > reach)
     engine = _of(drive, "engine_speed", grid)
-    engine = engine[(engine > 30.0) & (speed > SLIPS)]
+    engine = engine[(engine > 30.0) & (speed > DRIVES)]
     revs = engine.size >= 5 and engine.max() > REVS * engine.min()
-    return bool((np.ptp(accel) > VARIES or revs) and np.nanmax(speed) > SLIPS)
+    return bool((np.ptp(accel) > VARIES or revs) and np.nanmax(speed) > DRIVES)
 
 
 def _speed_frozen(drive: Drive, grid: Floats, value: float) -> bool:
@@ -153,7 +154,7 @@ def _speed_frozen(drive: Drive, grid: Floats, value: float) -> bool:
         return bool(np.ptp(ground) > APART and np.max(np.abs(ground - value)) > APART)
     engine = _of(drive, "engine_speed", grid)
     engine = engine[engine > 30.0]
-    return bool(value > SLIPS and engine.size >= 5 and engine.max() > SHIFTED * engine.min())
+    return bool(value > DRIVES and engine.size >= 5 and engine.max() > SHIFTED * engine.min())
 
 
 def _speed(drive: Drive, at: Floats) -> Floats:

@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 
 from weighbridge.errors import DriveError
+from weighbridge.limits import MANY, STANDS
 from weighbridge.messages import phrase
 from weighbridge.signals import Drive, Floats, Problem
 from weighbridge.signals.instants import instant
@@ -17,11 +18,9 @@ from weighbridge.vehicle.reported_torque import SAME_REFERENCE, reference_torque
 
 # Whoever changes vehicles takes longer than this [s], and the vehicle left stands.
 _PAUSE: Final = 5.0
-_STANDS: Final = 0.5  # [m/s]
 # The longest pauses only: where vehicles are changed, there is a long one.
 _PAUSES: Final = 6
-# Samples in gear enough to know the gears of a part.
-_ENOUGH: Final = 150
+
 # A gear's ratio is sharper than this [-].
 _NEAR: Final = 0.02
 # Parts of the samples that lie on the gears of their own part, and on those of the other one:
@@ -91,7 +90,7 @@ def _check_reference(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]
 def _check_gears(drive: Drive) -> Iterator[Problem]:
     """Compare the ratios of engine to vehicle speed before and after each long pause."""
     engine, speed = drive.get("engine_speed"), drive.get("vehicle_speed")
-    if engine is None or speed is None or len(speed) < _ENOUGH or len(engine) < 2 * _ENOUGH:
+    if engine is None or speed is None or len(speed) < MANY or len(engine) < 2 * MANY:
         return
     time = engine.time
     wheels = np.where(speed.age(time) < 1.0, speed.at(time), np.nan)
@@ -99,11 +98,11 @@ def _check_gears(drive: Drive) -> Iterator[Problem]:
     with np.errstate(invalid="ignore", divide="ignore"):
         moving = np.isfinite(gearing) & (wheels > _SLOW) & (gearing > 0.0)
         moving &= steady(time, gearing, _NEAR + 0.15 / np.maximum(wheels, 1.0))
-    if np.count_nonzero(moving) < 2 * _ENOUGH:
+    if np.count_nonzero(moving) < 2 * MANY:
         return
     for cut in _pauses(time, wheels):
         parts = [moving & (time < cut), moving & (time >= cut)]
-        if min(np.count_nonzero(p) for p in parts) < _ENOUGH:
+        if min(np.count_nonzero(p) for p in parts) < MANY:
             continue
         if _in_common(*(gearing[p] for p in parts)) > _FOREIGN + 1.0 - _OWN:
             continue
@@ -129,7 +128,7 @@ def _check_gears(drive: Drive) -> Iterator[Problem]:
 def _pauses(time: Floats, wheels: Floats) -> list[float]:
     """Middles of the longest times in which a vehicle could have been changed."""
     with np.errstate(invalid="ignore"):
-        driving = time[wheels > _STANDS]
+        driving = time[wheels > STANDS]
     if driving.size < 2:
         return []
     length = np.diff(driving)

@@ -10,6 +10,7 @@ from weighbridge.balance import Windows
 from weighbridge.balance.table import ForceBalance, ForceTable
 from weighbridge.estimators.joint.slow_errors import MOTION_WINDOW_STD, motion_variance
 from weighbridge.estimators.regression import regression
+from weighbridge.limits import CREEPS, PARTS, SOME
 from weighbridge.messages import Problem
 from weighbridge.navigation import BY_SPEED
 from weighbridge.navigation.motion import noise_level
@@ -25,12 +26,6 @@ SHORTEST: Final = 1.0
 
 APART: Final = 4.0
 """Windows further apart are not beside each other [s]."""
-
-FEWEST_PAIRS: Final = 40
-"""Fewer pairs of windows show no noise."""
-
-PARTS: Final = 12
-"""Parts of a drive that are left out one after another for a standard deviation."""
 
 FULL_TORQUE: Final = 0.8
 """Part of the highest torque of a drive from which on power is short [-]: chosen. With 0.85 of the
@@ -79,7 +74,7 @@ def learnt_noise(balance: ForceBalance, vehicle: Vehicle, cut: Windows) -> Motio
     if balance.wheel_speed is None or balance.motion.source in BY_SPEED:
         return MotionNoise(usual, std, learnt=False)
     changes = _changes(balance, vehicle, cut)
-    if changes.shape[1] < FEWEST_PAIRS:
+    if changes.shape[1] < SOME:
         return MotionNoise(usual, std, learnt=False)
     accel, force, speed = changes
     number = np.arange(accel.size) * PARTS // accel.size
@@ -248,9 +243,6 @@ def left_open(low: float, unsure: float) -> float:
 MOSTLY: Final = 0.5
 """Part of the information that counts as noise, at most [-]: beyond nothing is left to be shown."""
 
-ROW_FAST: Final = 2.0
-"""Rows below this speed show no noise [m/s]."""
-
 LEAST: Final = 0.01
 """Less is nothing [-]: undamaged drives have 0.002 to 0.004."""
 
@@ -273,7 +265,7 @@ def row_noise_std(table: ForceTable, phi: Floats, used: Bools, share: float) -> 
     used : (n,)
     share : error of the method's mass over the noise's part of the rows' mean square [-]
     """
-    moving = table.specific_force[np.isfinite(table.specific_force) & (table.speed > ROW_FAST)]
+    moving = table.specific_force[np.isfinite(table.specific_force) & (table.speed > CREEPS)]
     if not used.any() or moving.size < 10:
         return 0.0
     part = noise_level(moving) ** 2 / float(np.mean(phi[used] ** 2))

@@ -17,6 +17,7 @@ from weighbridge.errors import ConfigError
 from weighbridge.estimators.judging import converged_at
 from weighbridge.estimators.track import MassTrack, Status
 from weighbridge.kernels import speed_ekf as kernel
+from weighbridge.limits import SOME
 from weighbridge.messages import Problem
 from weighbridge.signals import Bools, Floats
 from weighbridge.vehicle import Vehicle
@@ -27,9 +28,6 @@ in a quarter of the drive."""
 
 GROUPS: Final = 10
 """Equal groups that the converged samples are cut into; chosen, the paper does not say."""
-
-FEWEST: Final = 30
-"""Fewer samples carry no mass."""
 
 LARGEST_SHARE: Final = 0.5
 """A mass that is the start by more than this was not found in the drive [-]."""
@@ -240,9 +238,9 @@ def _judge(
     vehicle: Vehicle, count: int, mass: float, std: float, share: float
 ) -> tuple[Status, Problem | None]:
     model = model_of(vehicle)
-    if count < FEWEST:
+    if count < SOME:
         return Status.NOT_EXCITED, Problem.of(
-            "speed.few_samples", count=count, period=model.sample_time, least=FEWEST
+            "speed.few_samples", count=count, period=model.sample_time, least=SOME
         )
     low, high = vehicle.of_class.mass_range
     if not low < mass < high:

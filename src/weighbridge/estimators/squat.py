@@ -12,6 +12,7 @@ from scipy.ndimage import uniform_filter1d
 from weighbridge.balance import ForceBalance
 from weighbridge.balance.law import squat_column
 from weighbridge.constants import GRAVITY, INDEPENDENT
+from weighbridge.limits import DOUBTED, FEWEST_PIECES, MOVES
 from weighbridge.messages import Problem, phrase
 from weighbridge.navigation import BY_SPEED, Motion, with_squat
 from weighbridge.signals import Bools, Floats
@@ -30,10 +31,6 @@ long the squat found was off by 0.0009, where the navigation says 0.0003."""
 LOADED_STD: Final = 0.0003
 """By how much the squat of a vehicle changes with its load [rad per m/s^2]."""
 
-DOUBTED: Final = 2.0
-"""Standard deviations by which the squat of a drive is not that of the calibration, from which a
-part of the difference is in the interval [-]."""
-
 ANOTHER: Final = 4.0
 """The same from which the sensor, not the body, leans another way [-]: ten undamaged simulated
 drives of a car, an electric car and a truck were 0.4 off at most, a holder that swings by 0.5
@@ -41,9 +38,6 @@ degrees per m/s^2 by 4 to 8."""
 
 LOADS: Final = (0.9, 1.2)
 """A vehicle is as light, and as heavy, as so many times the masses of its calibration [-]."""
-
-SLOWEST_WHEELS: Final = 1.0
-"""Slower than this wheels show no acceleration [m/s]."""
 
 AVERAGED: Final = 1.0
 """Accelerations are compared as means over this time [s]."""
@@ -54,9 +48,6 @@ BRIEF: Final = 10.0
 LEAST_ACCEL: Final = 0.15
 """Standard deviation of what is left that is needed [m/s^2]."""
 
-
-FEWEST_BLOCKS: Final = 4
-"""Fewer blocks of rows show no squat."""
 
 SPEED_SCALE_STD: Final = 0.015
 """Scale of the speed by the wheels, relative standard deviation [-]: that of the tyres' radius."""
@@ -197,7 +188,7 @@ def squat_by_speed(motion: Motion) -> tuple[float, float] | None:
     accelerates.
     """
     rate = motion.rate
-    moving = motion.valid & (motion.speed > SLOWEST_WHEELS)
+    moving = motion.valid & (motion.speed > MOVES)
     around = max(round(AVERAGED * rate), 1), max(round(BRIEF * rate), 1)
     parts = [
         uniform_filter1d(x, around[0]) - uniform_filter1d(x, around[1])
@@ -207,7 +198,7 @@ def squat_by_speed(motion: Motion) -> tuple[float, float] | None:
     block = (motion.time[inside] // INDEPENDENT).astype(np.int64)
     read, rolled = (x[inside] for x in parts)
     _, block = np.unique(block, return_inverse=True)
-    if block.size == 0 or block.max() < FEWEST_BLOCKS:
+    if block.size == 0 or block.max() < FEWEST_PIECES:
         return None
     cross = np.bincount(block, weights=read * rolled)
     square = np.bincount(block, weights=rolled**2)

@@ -22,6 +22,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from weighbridge.estimators.joint.load_stops import change_odds
+from weighbridge.limits import SURE
 from weighbridge.signals import Floats
 
 SETTLED: Final = 2.0
@@ -56,7 +57,7 @@ UNLOADED_STD: Final = 0.012
 LOADED: Final = 0.12
 """Change at a stop with one, mean of its size [-]: small ones are more frequent."""
 
-SURE: Final = 0.95
+PROBABLE: Final = 0.95
 """A change that is so probable is reported [-]: none of 256 quiet stops of 32 simulated vehicles
 had one by it, and 3 by 0.9."""
 
@@ -65,9 +66,6 @@ SIDED: Final = 0.9
 
 FEWEST: Final = 2
 """Changes that the motion has weighed, without which nothing is reported."""
-
-WEIGHED: Final = 3.0
-"""A change of so many standard deviations has been weighed [-]."""
 
 CLEAR: Final = 0.1
 """A change of so much of the mass must stand out of what the pitch does beside [-]."""
@@ -138,7 +136,7 @@ class TiltChange:
     @property
     def sure(self) -> bool:
         """Whether it is reported."""
-        return self.probability >= SURE and self.sided >= SIDED
+        return self.probability >= PROBABLE and self.sided >= SIDED
 
 
 @dataclass(frozen=True)
@@ -159,7 +157,7 @@ class TiltMap:
     @property
     def weighed(self) -> int:
         """Changes that the motion has weighed."""
-        return sum(abs(s.change) > WEIGHED * math.sqrt(s.change_var) for s in self.stops)
+        return sum(abs(s.change) > SURE * math.sqrt(s.change_var) for s in self.stops)
 
     @cached_property
     def _nodes(self) -> tuple[Floats, Floats, Floats, Floats]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from weighbridge.balance.table import MOVING
+from weighbridge.limits import STANDS
 from weighbridge.live.records import Records
 from weighbridge.live.source import Samples
 from weighbridge.live.weighing import SILENT, SignalHealth
@@ -137,7 +137,7 @@ def is_parked(records: Records, needed: tuple[str, ...], silence: float) -> bool
     """
     speeds = [name for names in _SPEEDS for name in names]
     last = max(speeds, key=records.newest_of)
-    if not records.newest_value(last) <= MOVING:
+    if not records.newest_value(last) <= STANDS:
         return False
     came = [
         name

@@ -8,9 +8,9 @@ from typing import Final
 import numpy as np
 
 from weighbridge.balance import WINDOW
-from weighbridge.balance.table import MOVING
 from weighbridge.estimators.joint import JointSettings
 from weighbridge.estimators.joint.possible import enough_windows
+from weighbridge.limits import STANDS
 from weighbridge.signals import Drive
 
 GAP: Final = 1.0
@@ -114,11 +114,11 @@ def time_on_the_move(drive: Drive, since: float) -> float:
     speed = drive.speed
     if speed is None:
         return 0.0
-    moved = (speed.values[1:] > MOVING) & (speed.time[1:] > since)
+    moved = (speed.values[1:] > STANDS) & (speed.time[1:] > since)
     return float(np.minimum(np.diff(speed.time), GAP)[moved].sum())
 
 
 def moves(drive: Drive, at: float) -> bool:
     """Whether the vehicle moves at an instant [s], by the last speed before it."""
     speed = drive.speed
-    return speed is not None and float(speed.held(np.array([at]))[0]) > MOVING
+    return speed is not None and float(speed.held(np.array([at]))[0]) > STANDS

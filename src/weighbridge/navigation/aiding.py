@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from weighbridge.kernels.lowpass import lowpass_resample
+from weighbridge.limits import MOVES
 from weighbridge.messages import refused
 from weighbridge.navigation.axes import Axes
 from weighbridge.navigation.dropouts import false_rows
@@ -22,9 +23,6 @@ _FEWEST = 50
 
 _BRIEF = 30.0
 """Too short to be weighed, whatever its samples are [s]."""
-
-_MOVES = 1.0
-"""Slower, a sensor may well repeat itself or read zero [m/s]."""
 
 _REACH = 3.0
 """Periods of an even clock to both sides that its low-pass reaches to [-]."""
@@ -114,7 +112,7 @@ def read_imu(drive: Drive) -> Imu:
     speed = drive.speed
     moving = np.ones(time.size, dtype=bool)
     if speed is not None and len(speed):
-        moving = interpolate(time, speed.time, speed.values) > _MOVES
+        moving = interpolate(time, speed.time, speed.values) > MOVES
     usual = signals[0].period if whole else float(np.median(np.diff(time)))
     imu = Imu(time, accel, gyro, usual)
     if imu.period > SLOWEST:

@@ -9,6 +9,7 @@ from typing import Final
 
 import numpy as np
 
+from weighbridge.limits import FEWEST_PIECES
 from weighbridge.messages import phrase
 from weighbridge.navigation.aiding import read_fixes, speed_from_fixes
 from weighbridge.navigation.clock_lag import (
@@ -41,8 +42,7 @@ _DRIFT: Final = 0.15
 _SURE: Final = 6.0
 # Range of the lag over a drive, beyond the scatter of its pieces, that is no sound clock's [s].
 _WANDER: Final = 0.3
-# Fewer pieces show no drift, and pieces overlap, so that they repeat each other's noise [-].
-_FEWEST: Final = 4
+# Pieces overlap, so that they repeat each other's noise [-].
 _OVERLAP: Final = 2.0
 # A change from one piece to the next that is a step of the clock [s].
 _STEP: Final = 0.4
@@ -172,7 +172,7 @@ def _gnss_speed(drive: Drive) -> Signal | None:
 def _lags(force: Integrated, speed: Signal) -> Lags:
     """Lags about zero, or about where else the drive fits."""
     lags = find_lags(force, speed)
-    if lags.pieces >= _FEWEST and lags.lag.size < 0.3 * lags.pieces:
+    if lags.pieces >= FEWEST_PIECES and lags.lag.size < 0.3 * lags.pieces:
         offset = find_offset(force, speed)
         if offset is not None:
             other = find_lags(force, speed, centre=offset)
@@ -183,7 +183,7 @@ def _lags(force: Integrated, speed: Signal) -> Lags:
 
 def _judged(lags: Lags, table: str) -> _Path | Problem | None:
     """Say how a table is to be moved, that it cannot be, or None where its clock is sound."""
-    if lags.lag.size < _FEWEST:
+    if lags.lag.size < FEWEST_PIECES:
         return None
     time, lag = lags.time, lags.lag
     # By second differences, so that neither drift nor step counts as scatter.

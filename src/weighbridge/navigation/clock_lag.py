@@ -13,6 +13,7 @@ from scipy.ndimage import uniform_filter1d
 from weighbridge.kernels.interpolation import integral
 from weighbridge.signals import Bools, Floats, Signal, resolution
 from weighbridge.signals.interpolation import interpolate
+from weighbridge.signals.lag import lag_std, parabola
 
 STEP: Final = 0.2
 """Grid on which force and speed are compared [s]."""
@@ -303,15 +304,12 @@ def _peak(explained: Floats, enough: Bools, size: int) -> tuple[float, float] | 
     left = 1.0 - explained
     if beyond.size and left[best] > _AMBIGUOUS * (1.0 - float(beyond.max())):
         return None
-    low, mid, high = left[best - 1 : best + 2]
-    curvature = low - 2.0 * mid + high
-    if curvature <= 0.0:
+    lags = STEP * (np.arange(best - 1.0, best + 2.0) - (explained.size - 1) // 2)
+    around = left[best - 1 : best + 2]
+    at, bend = parabola(lags, around)
+    if bend <= 0.0:
         return None
-    shift = 0.5 * (low - high) / curvature
-    independent = size * STEP / _SPAN
-    std = STEP * float(np.sqrt(2.0 * max(mid, 1e-3) / (independent * curvature)))
-    middle = (explained.size - 1) // 2
-    return (best - middle + float(shift)) * STEP, std
+    return at, lag_std(max(float(around[1]), 1e-3), bend, size * STEP / _SPAN)
 
 
 def _explained(x: Floats, force: Floats, felt: Bools) -> tuple[Floats, Bools]:

@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 
 from weighbridge.kernels.interpolation import longest_repeat
+from weighbridge.limits import MANY, MOVES
 from weighbridge.signals import Bools, Drive, Floats, Signal
 from weighbridge.signals.runs import marked_runs
 
@@ -25,12 +26,6 @@ _COARSE: Final = 0.5
 
 _COARSE_RUN: Final = 20.0
 """only longer runs are no smooth road [s]."""
-
-_FEWEST: Final = 100
-"""An axis that has fewer samples left stays as it is: the checks refuse it where it is needed."""
-
-_MOVES: Final = 1.0
-"""Faster, a body shakes too much for an accelerometer or gyro to repeat itself [m/s]."""
 
 
 def frozen_stretches(signal: Signal, speed: Signal | None) -> Floats:
@@ -66,7 +61,7 @@ def frozen_stretches(signal: Signal, speed: Signal | None) -> Floats:
     found = np.column_stack([signal.time[first], signal.time[last]])
     if speed is None or not len(speed) or not found.size:
         return found
-    fast = speed.time[np.abs(speed.values) > _MOVES]
+    fast = speed.time[np.abs(speed.values) > MOVES]
     # The speed is rounded and late: what it says at the very ends does not count.
     begun = np.searchsorted(fast, found[:, 0] + 0.5 * SHORTEST)
     ended = np.searchsorted(fast, found[:, 1] - 0.5 * SHORTEST, side="right")
@@ -90,6 +85,6 @@ def without_frozen(drive: Drive, names: Iterable[str]) -> Drive:
         if s is None or len(s) < 2:
             continue
         lost = inside(frozen_stretches(s, speed), s.time)
-        if lost.any() and np.count_nonzero(~lost) >= _FEWEST:
+        if lost.any() and np.count_nonzero(~lost) >= MANY:
             corrected.append(Signal(name, s.time[~lost], s.values[~lost]))
     return drive.with_signals(*corrected) if corrected else drive

@@ -29,6 +29,7 @@ from weighbridge.kernels.ins_model import (
     V,
 )
 from weighbridge.kernels.rotation import euler_to_matrix, matrix_to_euler, quaternions_to_euler
+from weighbridge.limits import CERTAIN
 from weighbridge.messages import Problem
 from weighbridge.navigation.aiding import Fixes
 from weighbridge.navigation.even import Even
@@ -51,9 +52,6 @@ _SQUAT_TIME: Final = 60.0
 
 _SCALE_FOUND: Final = 0.02
 """Below this standard deviation the drive has shown the scale of its speed [-]."""
-
-_FAILED: Final = 5.0
-"""A speed's scale found so many standard deviations from its prior is that of a lost filter [-]."""
 
 _REFUSED: Final = 0.5
 """A larger part of fixes refused is that of a lost filter, or of another drive's fixes [-]."""
@@ -206,7 +204,7 @@ def _check_found(scale: float, nodes: Nodes, fixed: Bools, setup: Setup) -> None
     if setup.origin is None:
         return
     off = abs(scale - 1.0) / setup.settings.speed_scale_std
-    if off > _FAILED:
+    if off > CERTAIN:
         raise Problem.of("gnss.scale", "latitude", scale=scale, off=off).error(LostError)
     refused = nodes.states[fixed, LOST_GNSS] > 0.0
     if refused.size and np.mean(refused) > _REFUSED:

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from weighbridge.limits import FEW
 from weighbridge.messages import refused
 from weighbridge.navigation.aiding import Fixes, Imu, read_fixes, read_imu, speed_from_fixes
 from weighbridge.signals import Drive, Signal
-
-_FEWEST = 10
-"""Fewer samples of a speed show nothing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,17 +50,17 @@ def read_sources(drive: Drive) -> Sources:
     reference = wheel or usable(drive.get("gnss_speed"), start, end)
     if reference is None and fixes is not None:
         reference = speed_from_fixes(fixes)
-    if reference is None or len(reference) < _FEWEST:
+    if reference is None or len(reference) < FEW:
         raise refused("motion.drifts", drive=drive.name)
     return Sources(drive, imu, fixes, wheel, reference)
 
 
 def usable(signal: Signal | None, start: float, end: float) -> Signal | None:
     """Return the signal if it has samples enough beside the inertial ones."""
-    if signal is None or len(signal) < _FEWEST:
+    if signal is None or len(signal) < FEW:
         return None
     inside = (signal.time > start - 1.0) & (signal.time < end + 1.0)
-    return signal if inside.sum() >= _FEWEST else None
+    return signal if inside.sum() >= FEW else None
 
 
 def undelayed(signal: Signal, delay: float) -> Signal:

@@ -9,6 +9,7 @@ import numpy as np
 
 from weighbridge.estimators.gate import GATE
 from weighbridge.estimators.joint.batch import JOINT_MOTION_STD
+from weighbridge.limits import CREEPS
 from weighbridge.navigation import MotionSource
 from weighbridge.signals import Drive
 from weighbridge.vehicle import Vehicle
@@ -74,9 +75,6 @@ _SHORT: Final = 150.0
 """Time of driving below which a mass may not come [s]. With an inertial sensor, 24 of 121 cuts of
 70 to 160 s carry none, and 7 of 261 longer ones."""
 
-_SLOW: Final = 2.0
-"""Speed below which a vehicle counts as standing [m/s]."""
-
 _SPARSE: Final = 60.0
 """Longest mean period of a speed that shows an acceleration [s]."""
 
@@ -116,7 +114,7 @@ def excitation(drive: Drive) -> Excitation:
     time = np.arange(speed.time[0], speed.time[-1], _SPACING)
     v = np.abs(np.interp(time, speed.time, speed.values))
     accel = (v[_BASE:] - v[:-_BASE]) / (_BASE * _SPACING)
-    driving = 0.5 * (v[_BASE:] + v[:-_BASE]) > _SLOW
+    driving = 0.5 * (v[_BASE:] + v[:-_BASE]) > CREEPS
     energy = float(np.sum(accel[driving] ** 2)) * _SPACING
     return Excitation(energy, float(np.count_nonzero(driving)) * _SPACING)
 

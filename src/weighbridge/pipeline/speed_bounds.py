@@ -19,6 +19,7 @@ from weighbridge.balance.law import rotating_mass
 from weighbridge.constants import GRAVITY
 from weighbridge.errors import ConfigError, DriveError
 from weighbridge.estimators.track import Status
+from weighbridge.limits import SURE
 from weighbridge.navigation import Motion, find_motion, without_accelerometer
 from weighbridge.signals import Drive, Floats
 from weighbridge.signals.instants import instant
@@ -33,9 +34,6 @@ SLOWEST: Final = 4.0
 
 COAST_WINDOW: Final = 4.0
 """Over which a coast-down is differenced [s]."""
-
-SURE: Final = 3.0
-"""Standard deviations by which a window must climb or gain speed to bound a mass."""
 
 Span = tuple[float, float]
 

@@ -5,6 +5,14 @@ from weighbridge.signals.alignment import Alignment, align
 from weighbridge.signals.catalogue import QUANTITIES, Quantity
 from weighbridge.signals.cleaning import NO_DRIVE, clean_columns, clean_signal, spread_rows
 from weighbridge.signals.drive import Drive, DriveInfo
+from weighbridge.signals.lag import (
+    best_lag,
+    find_lag,
+    lag_std,
+    lag_std_at,
+    lowest,
+    parabola,
+)
 from weighbridge.signals.parts import find_restarts, find_splices, numbered, parted
 from weighbridge.signals.recent import BEHIND, LONGEST_STEP, STEP, STEPS, recent, step_ends
 from weighbridge.signals.robust import (
@@ -46,15 +54,21 @@ __all__ = [
     "Signal",
     "Unit",
     "align",
+    "best_lag",
     "clean_columns",
     "clean_signal",
+    "find_lag",
     "find_restarts",
     "find_splices",
     "from_si",
     "huber",
+    "lag_std",
+    "lag_std_at",
+    "lowest",
     "median_of_three",
     "median_slope",
     "numbered",
+    "parabola",
     "parted",
     "recent",
     "resolution",

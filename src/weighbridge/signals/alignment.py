@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft
 from scipy.ndimage import uniform_filter1d
 
+from weighbridge.limits import PARTS
 from weighbridge.signals.signal import Bools, Floats, Signal
 
 STEP: Final = 0.1
@@ -33,7 +34,6 @@ _SHARE: Final = 0.3
 # Two sensors do not agree better [part of the variance]: below, the ends of a record decide.
 _EXACT: Final = 0.005
 # Parts of the common time by which the scatter of the offset is found.
-_BLOCKS: Final = 12
 
 # Beyond a day of samples of 0.1 s the transform would fill the memory.
 _LONGEST: Final = 86_400.0
@@ -210,7 +210,7 @@ def _refined(reference: Signal, other: Signal, offset: float) -> tuple[float, fl
         y, slope_y = reference.at(time), _slope(reference, time, half)
         x, slope_x = other.at(moved), _slope(other, moved, half)
         seen &= np.isfinite(y) & np.isfinite(x) & np.isfinite(slope_x) & np.isfinite(slope_y)
-        if np.count_nonzero(seen) < 4 * _BLOCKS:
+        if np.count_nonzero(seen) < 4 * PARTS:
             return offset, math.nan
         rows = np.column_stack([np.ones(time.size), x])[seen]
         fit, *_ = np.linalg.lstsq(rows, y[seen], rcond=None)
@@ -237,5 +237,5 @@ def _block_scatter(terms: Floats) -> float:
     The sandwich estimate with blocks as clusters (Liang and Zeger, Biometrika
     73(1), 1986, 13-22).
     """
-    sums = np.array([piece.sum() for piece in np.array_split(terms, _BLOCKS)])
-    return math.sqrt(float(sums @ sums) * _BLOCKS / (_BLOCKS - 1))
+    sums = np.array([piece.sum() for piece in np.array_split(terms, PARTS)])
+    return math.sqrt(float(sums @ sums) * PARTS / (PARTS - 1))

@@ -6,6 +6,7 @@ from typing import Final
 
 import numpy as np
 
+from weighbridge.limits import SOME
 from weighbridge.messages import Problem
 from weighbridge.signals.catalogue import QUANTITIES
 from weighbridge.signals.drive import Drive
@@ -13,9 +14,6 @@ from weighbridge.signals.signal import Bools, Floats, Signal
 
 DEVICES: Final = ("gnss", "imu")
 """Tables of one device: a row is new where any of its values is."""
-
-_FEWEST: Final = 30
-"""Fewer changes show no period [-]."""
 
 _OFTEN: Final = 0.8
 """With a larger part of the samples changed, each is new [-]."""
@@ -50,7 +48,7 @@ def renewed(time: Floats, changed: Bools) -> tuple[Bools, float]:
     """
     every = np.ones(time.size, dtype=bool)
     first = np.flatnonzero(changed)
-    if first.size < _FEWEST or first.size > _OFTEN * time.size:
+    if first.size < SOME or first.size > _OFTEN * time.size:
         return every, 0.0
     between = np.diff(time[first])
     shortest = float(np.percentile(between, 5.0))

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from weighbridge.constants import EARTH_RADIUS
+from weighbridge.limits import DRIVES, STANDS
 from weighbridge.messages import Problem
 from weighbridge.signals.drive import Drive
 from weighbridge.signals.instants import span
@@ -32,8 +33,6 @@ DRIVEN: Final = 30.0
 COUPLED: Final = 60.0
 """A trailer that is reported, or no more, for less is a bad contact [s]; chosen."""
 
-_STILL: Final = 0.5  # slower, the vehicle stands [m/s]
-_MOVING: Final = 3.0  # faster, it moves [m/s]
 _AS_BEFORE: Final = 3.0  # speeds to both sides of a clock that was set [m/s]
 
 # A splice: samples so near in time that differ as no vehicle's do, and so do those around them.
@@ -177,7 +176,7 @@ def _speed_jumps(speed: Signal) -> list[Cut]:
     stays &= np.nanmax(around, axis=1) < _ALONE * change[places]
     # A source that reads zero for a while jumps as well.
     for side in (before, after):
-        stays &= np.nanmin(side, axis=1) > _STILL
+        stays &= np.nanmin(side, axis=1) > STANDS
     return _reported(time, places[stays], "jumps of the speed")
 
 
@@ -235,10 +234,10 @@ def _starts_anew(speed: Signal, witnesses: Sequence[Signal]) -> list[Cut]:
     time, values = speed.time, np.abs(speed.values)
     possible = _possible(speed)
     hard = (np.diff(time) < _NEAR) & (values[:-1] - values[1:] > possible)
-    places = np.flatnonzero(hard & (values[1:] < _STILL))
+    places = np.flatnonzero(hard & (values[1:] < STANDS))
     kept = []
     for k in places:
-        ahead = np.flatnonzero(values[k + 1 :] > _STILL)
+        ahead = np.flatnonzero(values[k + 1 :] > STANDS)
         if not ahead.size or ahead[0] < _AROUND:
             continue
         off = k + 1 + int(ahead[0])
@@ -329,7 +328,7 @@ def _pauses(drive: Drive, speed: Signal) -> list[Cut]:
         at = int(np.argmax(step))
         before, after = float(speed.values[k]), float(speed.values[k + 1])
         # The clock was set while the vehicle moved on: one drive.
-        on = min(before, after) > _MOVING and abs(after - before) < _AS_BEFORE
+        on = min(before, after) > DRIVES and abs(after - before) < _AS_BEFORE
         if step[at] > PAUSE and not on:
             why = f"times of {PAUSE / 60.0:.0f} min or more in which nothing was recorded"
             found.append(Cut(float(seen[at]), float(seen[at + 1]), why))
@@ -338,7 +337,7 @@ def _pauses(drive: Drive, speed: Signal) -> list[Cut]:
 
 def _stops(speed: Signal) -> list[Cut]:
     """Stops of `STANDING` or more."""
-    still = np.abs(speed.values) < _STILL
+    still = np.abs(speed.values) < STANDS
     edges = np.flatnonzero(np.diff(np.concatenate(([0], still.view(np.int8), [0]))))
     first, last = speed.time[edges[0::2]], speed.time[edges[1::2] - 1]
     why = f"stops of {STANDING / 60.0:.0f} min or more"
@@ -362,7 +361,7 @@ def _couplings(drive: Drive, speed: Signal) -> list[Cut]:
     begins, states = bit.time[first], on[first]
     stays = np.diff(np.append(begins, bit.time[-1])) >= COUPLED
     begins, states = begins[stays], states[stays]
-    still = np.flatnonzero(np.abs(speed.values[:-1]) < _STILL)
+    still = np.flatnonzero(np.abs(speed.values[:-1]) < STANDS)
     found = []
     for begin in begins[1:][states[1:] != states[:-1]]:
         before = still[speed.time[still] <= begin]
@@ -398,7 +397,7 @@ def _driven(drive: Drive) -> bool:
     if speed is None or len(speed) < 2:
         return False
     step = np.minimum(np.diff(speed.time), STANDS_FOR)
-    return bool(np.sum(step[np.abs(speed.values[1:]) > _MOVING]) >= DRIVEN)
+    return bool(np.sum(step[np.abs(speed.values[1:]) > DRIVES]) >= DRIVEN)
 
 
 def find_restarts(time: Floats) -> list[slice]:

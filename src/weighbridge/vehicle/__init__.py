@@ -13,7 +13,6 @@ from weighbridge.vehicle.engine_delay import find_engine_delay, gathered_delay
 from weighbridge.vehicle.file import save_vehicle
 from weighbridge.vehicle.fuel import FUEL_STD, Burnt, fuel_burnt, fuel_flow, full_load_torque
 from weighbridge.vehicle.gear import (
-    UNSLIPPED,
     GearDetection,
     detect_gearings,
     effective_gearing,
@@ -53,7 +52,6 @@ from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
 __all__ = [
     "FUEL_STD",
     "TORQUE_SOURCES",
-    "UNSLIPPED",
     "VEHICLE_CLASSES",
     "Air",
     "Burnt",

@@ -6,13 +6,12 @@ from typing import Final
 
 import numpy as np
 
+from weighbridge.limits import DRIVES, LOCKED, SOME
 from weighbridge.signals import Bools, Floats, Ints, huber, spread
 from weighbridge.signals.interpolation import interpolate
 from weighbridge.vehicle.gear import (
     HIGHEST_GEARING,
     LOWEST_GEARING,
-    SLIPS,
-    UNSLIPPED,
     effective_gearing,
     predict_gear,
     ratio_counts,
@@ -42,9 +41,6 @@ an accelerometer alone rises by 3 % of itself."""
 
 STEADY: Final = 0.02
 """Change of the ratio from one sample to the next that is still one gear [-]."""
-
-FEWEST: Final = 30
-"""Rows of a gear that say something."""
 
 HALF: Final = 0.25
 """The rate of the speed is looked at over so long before and after [s]."""
@@ -133,8 +129,8 @@ def _entropy(time: Floats, engine_speed: Floats, motion: tuple[Floats, Floats]) 
     """Entropy of the ratios of engine to vehicle speed [nat]; infinite of too few."""
     speed = interpolate(time, *motion, left=0.0, right=0.0)
     ratio = effective_gearing(engine_speed, speed)
-    used = (speed > UNSLIPPED) & (ratio > LOWEST_GEARING) & (ratio < HIGHEST_GEARING)
-    if np.count_nonzero(used) < FEWEST:
+    used = (speed > LOCKED) & (ratio > LOWEST_GEARING) & (ratio < HIGHEST_GEARING)
+    if np.count_nonzero(used) < SOME:
         return np.inf
     counts = ratio_counts(ratio[used])
     share = counts[counts > 0] / np.count_nonzero(used)
@@ -148,14 +144,14 @@ def _in_gear(
     instants, speeds = motion
     inside = (time > instants[0]) & (time < instants[-1]) & np.isfinite(engine_speed)
     time, engine_speed = time[inside], engine_speed[inside]
-    if time.size < FEWEST:
+    if time.size < SOME:
         return None
     speed = interpolate(time, instants, speeds)
     ratio = effective_gearing(engine_speed, speed)
     gear, _ = predict_gear(engine_speed, speed, gearings)
-    held = steady(time, ratio, np.full(time.size, STEADY)) & (gear > 0) & (speed > SLIPS)
+    held = steady(time, ratio, np.full(time.size, STEADY)) & (gear > 0) & (speed > DRIVES)
     held &= _often(gear, held)
-    if np.count_nonzero(held) < FEWEST:
+    if np.count_nonzero(held) < SOME:
         return None
     ahead, behind = (interpolate(time[held] + by, instants, speeds) for by in (HALF, -HALF))
     rate = (ahead - behind) / (2.0 * HALF * speed[held])
@@ -166,7 +162,7 @@ def _in_gear(
 def _often(gear: Ints, held: Bools) -> Bools:
     """Rows (n,) whose gear has enough of them."""
     count = np.bincount(gear[held], minlength=int(gear.max(initial=0)) + 1)
-    return np.asarray(count[gear] >= FEWEST)
+    return np.asarray(count[gear] >= SOME)
 
 
 def _slope(rate: Floats, log_ratio: Floats, gear: Ints, alike: float) -> tuple[float, float]:

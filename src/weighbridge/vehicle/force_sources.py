@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
+from weighbridge.limits import MOVES, SOME
 from weighbridge.messages import Problem, phrase
 from weighbridge.signals import Drive, Floats, Signal
 from weighbridge.vehicle.gear import spin_rate
@@ -20,17 +21,11 @@ from weighbridge.vehicle.torque_source import (
     TorqueConstants,
 )
 
-SLOWEST_POWER: Final = 1.0
-"""Slower than this a power says nothing of a force [m/s]."""
-
 SLOWEST_SHAFT: Final = 15.0
 """Slower than this a power says nothing of a torque [rad/s]."""
 
 STANDING: Final = 0.1
 """Slower than this the vehicle stands [m/s]."""
-
-FEWEST_STANDING: Final = 20
-"""Samples at standstill that show what a battery gives beside driving."""
 
 NEAR: Final = 60.0
 """Standstill so near driving shows what the battery gives beside it [s]."""
@@ -131,13 +126,11 @@ def _speed_of(drive: Drive) -> Signal:
 
 def _shown_speed(drive: Drive, time: Floats) -> Floats:
     speed = np.abs(_fresh(_speed_of(drive), time))
-    return np.where(speed >= SLOWEST_POWER, speed, np.nan)
+    return np.where(speed >= MOVES, speed, np.nan)
 
 
 def _power_by_speed(drive: Drive, time: Floats, _: TorqueConstants) -> Floats:
-    return _per(
-        drive.signals["engine_power"].at(time), _fresh(_speed_of(drive), time), SLOWEST_POWER
-    )
+    return _per(drive.signals["engine_power"].at(time), _fresh(_speed_of(drive), time), MOVES)
 
 
 def battery_use(drive: Drive) -> BatteryUse:
@@ -159,12 +152,12 @@ def battery_use(drive: Drive) -> BatteryUse:
     averaged = uniform_filter1d(np.nan_to_num(v), around) if time.size else v
     gained = np.gradient(averaged**2, time) if time.size > 1 else np.zeros(time.size)
     sign = math.copysign(1.0, float((power - np.mean(power)) @ gained)) if time.size else 1.0
-    moves = time[np.abs(v) >= SLOWEST_POWER]
+    moves = time[np.abs(v) >= MOVES]
     near = np.searchsorted(moves, time + NEAR) > np.searchsorted(moves, time - NEAR)
     # Long after or before driving it may charge or heat.
     standing = (np.abs(v) < STANDING) & near & (sign * power >= 0.0)
     rest = ACCESSORIES
-    if np.count_nonzero(standing) >= FEWEST_STANDING:
+    if np.count_nonzero(standing) >= SOME:
         rest = float(np.median(sign * power[standing]))
     return BatteryUse(sign, rest)
 
@@ -180,7 +173,7 @@ def _driving_power(drive: Drive, use: BatteryUse | None = None) -> Signal:
 
 def _battery(drive: Drive, time: Floats, model: TorqueConstants) -> Floats:
     power = _fresh(_driving_power(drive, model.battery), time)
-    force = _per(power, _fresh(_speed_of(drive), time), SLOWEST_POWER)
+    force = _per(power, _fresh(_speed_of(drive), time), MOVES)
     efficiency = BATTERY_EFFICIENCY[0]
     return np.asarray(np.where(force >= 0.0, efficiency * force, force / efficiency))
 
@@ -194,7 +187,7 @@ def _engine_and_battery(drive: Drive, time: Floats, model: TorqueConstants) -> F
     torque = torque_in_nm if drive.has("engine_torque") else torque_in_percent
     spun = ENGINE_INERTIA * spin_rate(turning, time)
     power = (torque(drive, time, model) - spun) * _fresh(turning, time)
-    by_engine = _per(power, _fresh(_speed_of(drive), time), SLOWEST_POWER)
+    by_engine = _per(power, _fresh(_speed_of(drive), time), MOVES)
     return np.asarray(by_engine + _battery(drive, time, model))
 
 

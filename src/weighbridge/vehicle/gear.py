@@ -9,6 +9,7 @@ from typing import Final
 
 import numpy as np
 
+from weighbridge.limits import FEW, LOCKED, MANY
 from weighbridge.messages import refused
 from weighbridge.signals import Bools, Floats, Ints, Signal, spread
 
@@ -37,22 +38,12 @@ clutch slips; 0.47 at most in 16 stepless ones."""
 BEYOND_LAST: Final = 1.05
 """Ratios within this factor of the lowest are the last one [-]."""
 
-FEWEST_SECONDS: Final = 100
-"""On the move that show it."""
-
 STANDS: Final = 20.0
 """Slower than this an engine does not run [rad/s]: engines idle at 50 and more."""
 
 RATE_SPAN: Final = 0.2
 """The rate of an engine speed is looked at over so long before and after [s]: with 0.4 s the masses
 of six pairs of the corpus with a stepless gearbox change by 0.2 % at most."""
-
-SLIPS: Final = 3.0
-"""Slower, clutch and converter slip [m/s]."""
-
-UNSLIPPED: Final = 6.0
-"""Speed from which clutch and converter in front of a stepless gearbox are locked [m/s]: they lock
-by 20 km/h."""
 
 REPORTED_NEAR: Final = 0.06
 """A gear reported belongs to the gearing its median ratio is this near to [-]."""
@@ -233,13 +224,13 @@ def stepless_range(
     size = np.diff(first, append=time.size)
     engine_speed, speed = (np.add.reduceat(v, first) / size for v in (engine_speed, speed))
     gearing = effective_gearing(engine_speed, speed)
-    turning = (engine_speed > 1.12 * idle_speed) & (speed > UNSLIPPED)
+    turning = (engine_speed > 1.12 * idle_speed) & (speed > LOCKED)
     gearing = gearing[turning & (gearing > LOWEST_GEARING) & (gearing < HIGHEST_GEARING)]
-    if gearing.size < FEWEST_SECONDS:
+    if gearing.size < MANY:
         return None
     # A stepless gearbox rests at its last ratio, a gearbox with gears at others as well.
     others = gearing[gearing > BEYOND_LAST * np.percentile(gearing, 1.0)]
-    if others.size < FEWEST_SECONDS:
+    if others.size < MANY:
         return None
     if np.sum(np.sort(ratio_counts(others))[-GEARS_TAKE:]) >= ON_RATIOS * others.size:
         return None
@@ -392,10 +383,6 @@ def shifting(time: Floats, gear: Ints, *, margin: float, ahead: float = math.inf
     return np.asarray(later | (time - instants[after - 1] <= margin))
 
 
-FEWEST_IDLING: Final = 10
-"""Fewer samples near each other may be a start of the engine [-]."""
-
-
 def idling(engine_speed: Floats, speed: Floats) -> float:
     """Most usual speed of an engine that runs while the vehicle stands.
 
@@ -412,7 +399,7 @@ def idling(engine_speed: Floats, speed: Floats) -> float:
     # The densest 2 %: starts, stops and a foot on the accelerator spread wide.
     end = np.searchsorted(running, 1.02 * running, side="right")
     count = end - np.arange(running.size)
-    if np.max(count, initial=0) < FEWEST_IDLING:
+    if np.max(count, initial=0) < FEW:
         return 0.0
     densest = int(np.argmax(count))
     return float(np.median(running[densest : end[densest]]))

@@ -16,10 +16,11 @@ from typing import Any, Final
 import numpy as np
 
 from weighbridge.constants import INDEPENDENT
+from weighbridge.limits import DOUBTED, MOVES
 from weighbridge.messages import Problem
 from weighbridge.signals import Bools, Drive, Floats, Signal, robust_fit
+from weighbridge.signals.lag import best_lag
 from weighbridge.vehicle.data_sheet import by_data_sheet, torque_std
-from weighbridge.vehicle.force_sources import SLOWEST_POWER
 from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.torque import engine_torque, source_of
 
@@ -52,10 +53,6 @@ WINDOW: Final = 1.0
 
 LATEST: Final = 1.0
 """Battery power may be later or earlier than torque by this much [s]."""
-
-
-CONTRADICTION: Final = 2.0
-"""Battery and data sheet contradict each other beyond so many standard deviations [-]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -197,7 +194,7 @@ def by_power(drive: Drive, vehicle: Vehicle) -> tuple[Vehicle, tuple[Problem, ..
     weight = usual**2 / (usual**2 + found.std**2)
     scale = 1.0 + weight * (found.scale - 1.0)
     std = math.sqrt(weight) * found.std
-    unusual = abs(found.scale - 1.0) > CONTRADICTION * math.hypot(usual, found.std)
+    unusual = abs(found.scale - 1.0) > DOUBTED * math.hypot(usual, found.std)
     if unusual:
         std = math.hypot(std, found.scale - scale)
     offset, slope, *powers = vehicle.torque.coefficients or (0.0, 1.0)
@@ -227,7 +224,10 @@ def _rows(drive: Drive, vehicle: Vehicle) -> tuple[Floats, Floats, Floats, Bools
     speed = turning.at(time) * (1.0 if turning.name == "engine_speed" else gearings[0])
     shaft = engine_torque(drive, vehicle, speed, time).torque * speed
     power = Signal("battery_power", volts.time, volts.values * amps.at(volts.time))
-    electric = power.at(time + _lateness(shaft, power, time))
+    late = _lateness(shaft, power, time)
+    if math.isnan(late):
+        return None
+    electric = power.at(time + late)
     known = np.isfinite(shaft) & np.isfinite(electric)
     for signal in used:
         known &= signal.age(time) <= max(3.0 * signal.period, STEP)
@@ -241,18 +241,18 @@ def _rows(drive: Drive, vehicle: Vehicle) -> tuple[Floats, Floats, Floats, Bools
         np.bincount(number, weights=np.nan_to_num(x))[whole] / count[whole]
         for x in (time, shaft, electric, speed)
     )
-    return at, at_shaft, at_battery, at_speed > SLOWEST_POWER * gearings[0]
+    return at, at_shaft, at_battery, at_speed > MOVES * gearings[0]
 
 
 def _lateness(shaft: Floats, power: Signal, time: Floats) -> float:
-    """How late battery power is against torque [s], by the best agreement of their changes."""
-    change = np.nan_to_num(np.diff(shaft, prepend=shaft[:1]))
-    shifts = STEP * np.arange(-int(LATEST / STEP), int(LATEST / STEP) + 1)
-    scores = []
-    for shift in shifts:
-        moved = power.at(time + shift)
-        scores.append(abs(float(change @ np.nan_to_num(np.diff(moved, prepend=moved[:1])))))
-    return float(shifts[int(np.argmax(scores))])
+    """How late battery power is against torque, by their changes [s]; NaN beyond `LATEST`."""
+
+    def change(values: Floats) -> Floats:
+        return np.nan_to_num(np.diff(values, prepend=values[:1]))
+
+    shifts = np.asarray(STEP * np.arange(-int(LATEST / STEP), int(LATEST / STEP) + 1))
+    own = change(shaft)
+    return best_lag(own, (change(power.at(time + shift)) for shift in shifts), shifts).at
 
 
 def _without_slow(time: Floats, values: Floats) -> Floats:

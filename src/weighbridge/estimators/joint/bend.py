@@ -14,6 +14,7 @@ import numpy as np
 
 from weighbridge.estimators.joint.problem import UNMODELLED, FilterInput
 from weighbridge.kernels import disturbance
+from weighbridge.limits import SURER
 from weighbridge.messages import Problem
 from weighbridge.signals import Drive, Floats
 from weighbridge.vehicle import Vehicle, source_of
@@ -32,9 +33,6 @@ simulators, in cars, vans, trucks and buses, had 0.07 at most."""
 TOO_MUCH: Final = 0.35
 """The same of a part that is too much [-]: gusts and hills that a gentle driver answers look alike,
 and undamaged drives had 0.23, or 0.33 hardly known."""
-
-SURE: Final = 4.0
-"""Standard deviations by which either has to be known as well [-]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,7 +135,7 @@ def bent(bend: TorqueBend | None, drive: Drive, vehicle: Vehicle) -> Problem | N
     if set(source.found(drive)) & set(drive.info.trusted):
         return None
     least = BENT if bend.part > 0.0 else TOO_MUCH
-    if abs(bend.part) <= max(least, SURE * bend.std):
+    if abs(bend.part) <= max(least, SURER * bend.std):
         return None
     less = "less" if bend.part > 0.0 else "more"
     return Problem.of(

@@ -10,6 +10,7 @@ import numpy as np
 from weighbridge.estimators.joint.load_stops import loadable
 from weighbridge.estimators.joint.problem import FilterInput
 from weighbridge.kernels import disturbance
+from weighbridge.limits import CERTAIN
 from weighbridge.messages import Problem, phrase
 from weighbridge.navigation import MotionSource
 from weighbridge.signals import Floats
@@ -34,9 +35,6 @@ classes, it was at most 2; a step or a ramp by a fifth in mid-drive gave 20 to 2
 
 DOUBTFUL: Final = 5.0
 """The same from which a change is reported as possible, and the mass is given [-]."""
-
-SIGNIFICANT: Final = 5.0
-"""Changes below so many standard deviations are not reported [-]."""
 
 LEAST: Final = 0.08
 """Smaller changes of the scale are not reported [-]: two of 118 undamaged motorways of the accuracy
@@ -99,7 +97,7 @@ class ScaleChange:
 
     @property
     def _large(self) -> bool:
-        return abs(self.change) > max(LEAST, SIGNIFICANT * self.std)
+        return abs(self.change) > max(LEAST, CERTAIN * self.std)
 
     def _found(self, id: str) -> Problem:
         when = (

@@ -7,14 +7,12 @@ from typing import Final
 import numpy as np
 
 from weighbridge.estimators.track import MassTrack, Status
+from weighbridge.limits import DOUBTED
 from weighbridge.messages import Problem
 
 APART: Final = 0.10
 """Masses that differ by more contradict each other [-]: undamaged drives of ten minutes and more
 had 0.05, and 0.08 where a cold engine made it less sure."""
-
-SURE: Final = 2.0
-"""Standard deviations of both by which they have to differ as well [-]."""
 
 
 def contradicted(track: MassTrack, joined: MassTrack) -> Problem | None:
@@ -38,7 +36,7 @@ def contradicted(track: MassTrack, joined: MassTrack) -> Problem | None:
         return None
     apart = abs(float(np.log(track.mass / joined.mass)))
     std = float(np.hypot(track.std / track.mass, joined.std / joined.mass))
-    if apart <= max(APART, SURE * std):
+    if apart <= max(APART, DOUBTED * std):
         return None
     return Problem.of(
         "method.contradicted", method=track.method, mass=track.mass, joint_mass=joined.mass

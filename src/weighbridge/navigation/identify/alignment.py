@@ -11,6 +11,7 @@ from scipy.ndimage import uniform_filter1d
 
 from weighbridge.constants import GRAVITY
 from weighbridge.kernels.rotation import euler_to_matrix
+from weighbridge.limits import MOVES, SURER
 from weighbridge.messages import Problem, refused
 from weighbridge.navigation.aiding import Fixes, interpolated, resample, speed_from_fixes
 from weighbridge.navigation.even import Even
@@ -31,16 +32,11 @@ FINE_RATE: Final = 20.0
 """Clock of the delays [Hz]."""
 
 MOST_MOVED: Final = 0.2
-"""A mounting further from the one given is another one [rad],"""
-
-_MOVED_SURE: Final = 4.0
-"""if it is by so many standard deviations: a steady drive hardly shows where ahead is [-]."""
+"""A mounting further from the one given, and by `SURER` standard deviations, is another [rad]: a
+steady drive hardly shows where ahead is."""
 
 _NOD_BAND: Final = (2.0, 20.0)
 """A nod is looked for between means over so long [s]: slower turns are grade."""
-
-_ROLLS: Final = 1.0
-"""Slower, a speed in steps changes by leaps [m/s]."""
 
 _NODS: Final = (0.6, 1.6)
 """Part of a difference of speed and accelerometer that a nod explains where it is the cause [-]."""
@@ -138,7 +134,7 @@ def _merged(found: Alignment, coarse: CoarseMounting) -> tuple[Alignment, Proble
         return own, None
     angle = math.acos(np.clip(0.5 * (np.trace(found.rot_bs @ coarse.rot_bs.T) - 1.0), -1, 1))
     unsure = math.hypot(coarse.yaw_std, coarse.tilt_std, found.tilt_std, found.yaw_std)
-    if angle <= max(MOST_MOVED, _MOVED_SURE * unsure):
+    if angle <= max(MOST_MOVED, SURER * unsure):
         return replace(found, yaw_rate_bias=bias), None
     return own, Problem.of("imu.mounting_moved", angle=math.degrees(angle))
 
@@ -146,7 +142,7 @@ def _merged(found: Alignment, coarse: CoarseMounting) -> tuple[Alignment, Proble
 def _nod(imu: Even, coarse: CoarseMounting, speed: Signal) -> float:
     """Turn of the sensor per acceleration, nose up, by its gyro [rad per m/s^2]."""
     at = _coarse_speed(speed, imu.time)
-    known = np.isfinite(at) & (at > _ROLLS)
+    known = np.isfinite(at) & (at > MOVES)
     accel = np.gradient(np.where(known, at, 0.0), imu.time)
     turned = np.cumsum(imu.values[:, 3:] @ coarse.rot_bs[1]) * COARSE_PERIOD
     short, long = (max(3, round(x / COARSE_PERIOD)) for x in _NOD_BAND)

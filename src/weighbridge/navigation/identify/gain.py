@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
 from weighbridge.constants import GRAVITY, INDEPENDENT, SAMPLES_AT_ONCE
+from weighbridge.limits import FEWEST_BLOCKS, MOVES, SURER
 from weighbridge.navigation.axes import Axes
 from weighbridge.navigation.identify.steps import fitted
 from weighbridge.navigation.motion import Motion
@@ -25,16 +26,6 @@ filter takes an error of the scale for grade."""
 
 _LEVEL: Final = 30.0
 """Means over so long are taken off: they are grade and bias [s]."""
-
-_SLOW: Final = 1.0
-"""Slower, wheels do not show their speed [m/s]."""
-
-
-_FEWEST: Final = 5
-"""Fewer blocks show no scale."""
-
-_SURE: Final = 4.0
-"""Standard deviations by which a scale is off [-]."""
 
 _SURE_TWICE: Final = 2.0
 """The same where gravity shows the scale too [-]."""
@@ -170,14 +161,14 @@ def find_gain(
     strong = square > 0.05 * float(np.max(square))
     square, common = square[strong], common[strong]
     at = np.bincount(block, time)[strong] / np.bincount(block)[strong]
-    if at.size < _FEWEST:
+    if at.size < FEWEST_BLOCKS:
         return None
     # Weighed by what each block shows, so that quiet ones do no harm.
     inverse, weight = common / square, square / float(np.mean(square))
     mean = float(common.sum() / square.sum())
     curve = np.full(2, mean)
     ends = at[[0, -1]]
-    step = fitted(at, inverse, weight, _FLOOR, like=1.0) if at.size >= 2 * _FEWEST else None
+    step = fitted(at, inverse, weight, _FLOOR, like=1.0) if at.size >= 2 * FEWEST_BLOCKS else None
     if step is not None and step.sureness > _CHANGE_SURE and abs(step.size) > _LEAST:
         half = 0.5 * max(step.length, 1.0)
         ends = np.array([step.center - half, step.center + half])
@@ -192,7 +183,7 @@ def find_gain(
     noise = max(float(np.mean(error)) - rounding, 0.0) / float(np.mean(shown**2))
     found = Gain(ends, 1.0 / curve, std)
     upheld = not again and _upheld(found, gravity)
-    least = _LEFT if again else max(_LEAST, (_SURE_TWICE if upheld else _SURE) * std)
+    least = _LEFT if again else max(_LEAST, (_SURE_TWICE if upheld else SURER) * std)
     if float(np.average(off, weights=weight)) < least + noise or float(np.max(off)) > _MOST:
         return None
     if again or upheld:
@@ -259,7 +250,7 @@ def changes_of_speed(
     total = np.concatenate(([0.0], np.cumsum(0.5 * (motion.accel[1:] + motion.accel[:-1]))))
     total *= clock
     place = np.clip(np.searchsorted(motion.time, stamps), 0, motion.time.size - 1)
-    useless = ~motion.valid | (motion.speed < _SLOW)
+    useless = ~motion.valid | (motion.speed < MOVES)
     lost = np.concatenate(([0], np.cumsum(useless)))[place]
     force = np.interp(stamps, motion.time, total)
     whole = lost[ahead:] == lost[:-ahead]

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from weighbridge.constants import GRAVITY
+from weighbridge.limits import DRIVES
 from weighbridge.messages import Problem, phrase
 from weighbridge.navigation.even import Even
 from weighbridge.navigation.identify.steps import SIDE, Step, fitted
@@ -24,9 +25,6 @@ from weighbridge.signals.instants import instant, span
 
 _SPAN: Final = 4
 """Coarse periods over which the speed's change is compared [-]: shorter has its steps."""
-
-_MOVING: Final = 3.0
-"""Slower, rounding and brakes make more of the force than the road does [m/s]."""
 
 _BLOCK: Final = 20.0
 """Rows are averaged over so long [s]."""
@@ -249,7 +247,7 @@ def _rows(time: Floats, values: Floats, speed: Floats, rot_bs: Floats, slope: Fl
         tilt=np.where(whole[:, None], tilt, np.nan),
         felt=felt,
         shown=shown,
-        moving=whole & (mean(v) > _MOVING),
+        moving=whole & (mean(v) > DRIVES),
     )
 
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
 
 import numpy as np
 
 from weighbridge.kernels.interpolation import moved_changes
 from weighbridge.signals import Floats, Signal
 from weighbridge.signals.correlation import inner
+from weighbridge.signals.lag import find_lag, lag_std_at
 
 _SPAN = 1.5
 """Speed changes are compared over this time [s]: longer lets grade in, shorter noise."""
@@ -85,37 +86,8 @@ def estimate_speed_delay(
         left = target - gain * model if gain > 0.0 else target
         return inner(left, left)
 
-    delay, least, curvature = _minimum(residual, low, high)
-    if curvature <= 0.0 or least > 0.7 * inner(target, target):
+    delay = find_lag(residual, low, high, farthest=high + 0.2)
+    if math.isnan(delay) or residual(delay) > 0.7 * inner(target, target):
         return 0.0, np.inf
-    # overlapping spans repeat the same noise `ahead` times
-    noise_var = least / target.size
-    return delay, float(np.sqrt(2.0 * noise_var * ahead / curvature))
-
-
-def _minimum(
-    residual: Callable[[float], float], low: float, high: float
-) -> tuple[float, float, float]:
-    """Find the delay of the least residual, that residual, and its curvature.
-
-    The curvature is negative where the least lies at ``low`` or ``high``.
-    """
-    grid = np.arange(low, high + 1e-9, 0.1)
-    cost = {k: residual(float(grid[k])) for k in range(0, grid.size, 2)}
-    middle = min(cost, key=lambda k: cost[k])
-    cost |= {k: residual(float(grid[k])) for k in (middle - 1, middle + 1) if 0 <= k < grid.size}
-    best = float(grid[min(cost, key=lambda k: cost[k])])
-    fine = best + np.arange(-0.1, 0.1001, 0.02)
-    cost, k = {}, fine.size // 2
-    while True:
-        near = range(k - 1, k + 2)
-        cost |= {j: residual(float(fine[j])) for j in near if j not in cost}
-        lowest = int(np.clip(min(near, key=lambda j: cost[j]), 1, fine.size - 2))
-        if lowest == k:
-            break
-        k = lowest
-    left, mid, right = (cost[j] for j in near)
-    curvature = (left - 2.0 * mid + right) / 0.02**2
-    if curvature <= 0.0 or not low < best < high:
-        return best, mid, -1.0
-    return float(fine[k]) + 0.5 * (left - right) / (curvature * 0.02), mid, curvature
+    # Overlapping spans repeat the same noise.
+    return delay, lag_std_at(residual, delay, target.size / ahead)
