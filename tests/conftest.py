@@ -27,7 +27,7 @@ import numpy as np
 import pytest
 
 import weighbridge as wb
-from tests.order import guards, is_long, longest_first
+from tests.order import guards, is_long, longest_first, starts_processes
 
 if TYPE_CHECKING:
     from weighbridge.simulation import SimulatedDrive
@@ -95,6 +95,9 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     if long and not wanted and not any("::" in arg for arg in config.args):
         config.hook.pytest_deselected(items=long)
         items[:] = [item for item in items if item not in set(long)]
+    for item in items:
+        if starts_processes(item):
+            item.fixturenames.insert(0, "turn")
     longest_first(items)
 
 
@@ -209,19 +212,27 @@ def assert_damage_is_told(
 
 
 @pytest.fixture(scope="module")
-def chromium(tmp_path_factory):
-    """Headless Chromium of playwright, one for a file of tests, and one at a time: it is large."""
+def turn(tmp_path_factory):
+    """Wait until no other worker runs a file whose processes take much memory."""
+    with (tmp_path_factory.getbasetemp().parent / "turn").open("w") as file:
+        # Windows has no such lock.
+        with contextlib.suppress(ImportError):
+            import fcntl
+
+            fcntl.flock(file, fcntl.LOCK_EX)
+        yield
+
+
+@pytest.fixture(scope="module")
+def chromium(turn):
+    """Headless Chromium of playwright, one for a file of tests."""
     sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-    fcntl = pytest.importorskip("fcntl", reason="no files are locked here")
     if CHROMIUM is None:
         pytest.skip("no Chromium is installed")
-    turn = tmp_path_factory.getbasetemp().parent / "chromium.turn"
-    with turn.open("w") as file:
-        fcntl.flock(file, fcntl.LOCK_EX)
-        with sync_api.sync_playwright() as play:
-            started = play.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-            yield started
-            started.close()
+    with sync_api.sync_playwright() as play:
+        started = play.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+        yield started
+        started.close()
 
 
 @pytest.fixture

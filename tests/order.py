@@ -1,7 +1,7 @@
 """Which tests run first, and which only when asked for.
 
-Files that start other programs come first, then long ones; those that need the browser are run one
-at a time. `.ci/quick` takes what fits. Tests of `long.toml` run with ``--long``.
+Files that start other programs come first, then long ones; those whose processes take much memory
+are run one at a time. `.ci/quick` takes what fits. Tests of `long.toml` run with ``--long``.
 
 ``pytest --junitxml=build/tests.xml`` and then ``python -m tests.order build/tests.xml`` write
 the list again.
@@ -20,11 +20,13 @@ LIST = ROOT / "tests" / "order.csv"
 LONG = ROOT / "tests" / "long.toml"
 STARTING = (
     "cli/test_fleet_command.py",
+    "fleet/test_kills.py",
     "fleet/test_learning.py",
+    "fleet/test_run.py",
     "unit/test_fault_study.py",
     "unit/test_simulated_fleet.py",
 )
-"""Files whose tests start processes through the program; each takes up to 400 MB."""
+"""Files whose tests start processes that weigh; each takes up to 400 MB."""
 
 UNKNOWN = 10.0
 """Taken for a file that is not on the list [s]."""
@@ -36,6 +38,11 @@ def seconds() -> dict[str, float]:
         return {row["file"]: float(row["seconds"]) for row in csv.DictReader(file)}
 
 
+def starts_processes(item) -> bool:
+    """Whether a test is of a file of `STARTING`."""
+    return item.path.as_posix().endswith(STARTING)
+
+
 def longest_first(items: list) -> None:
     """Put the tests of new and of long files first; within a file the order stays.
 
@@ -43,28 +50,24 @@ def longest_first(items: list) -> None:
     """
     known = seconds()
     took = {i.path: known.get(i.path.relative_to(ROOT).as_posix(), math.inf) for i in items}
-    browsing = {item.path for item in items if "chromium" in item.fixturenames}
-    starting = browsing | {
-        item.path
-        for item in items
-        if hasattr(item.module, "subprocess") or item.path.as_posix().endswith(STARTING)
-    }
+    large = {i.path for i in items if starts_processes(i) or "chromium" in i.fixturenames}
+    starting = large | {item.path for item in items if hasattr(item.module, "subprocess")}
     files = sorted(took, key=lambda path: (path not in starting, -took[path]))
-    place = {path: k for k, path in enumerate(one_at_a_time(files, browsing, took))}
+    place = {path: k for k, path in enumerate(one_at_a_time(files, large, took))}
     items.sort(key=lambda item: place[item.path])
 
 
-def one_at_a_time(files: list, browsing: set, took: dict) -> list:
+def one_at_a_time(files: list, large: set, took: dict) -> list:
     """Put files apart that wait for each other, where two workers take one after another.
 
     Parameters
     ----------
     files : in the order that is kept otherwise
-    browsing : those of them that need the one browser
+    large : those of them that wait for each other
     took : of each [s]
     """
-    waiting = [file for file in files if file in browsing]
-    others = [file for file in files if file not in browsing]
+    waiting = [file for file in files if file in large]
+    others = [file for file in files if file not in large]
     ordered: list = []
     free, closed = [0.0, 0.0], 0.0
     while waiting or others:
