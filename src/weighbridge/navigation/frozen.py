@@ -7,7 +7,6 @@ from typing import Final
 
 import numpy as np
 
-from weighbridge.kernels.interpolation import longest_repeat
 from weighbridge.limits import MANY, MOVES
 from weighbridge.signals import Bools, Drive, Floats, Signal
 from weighbridge.signals.runs import marked_runs
@@ -45,7 +44,7 @@ def frozen_stretches(signal: Signal, speed: Signal | None) -> Floats:
     (k, 2) first and last instant of each stretch [s]
     """
     nothing = np.empty((0, 2))
-    if longest_repeat(signal.time, signal.values) < min(SHORTEST, _COARSE_RUN):
+    if signal.longest_repeat < SHORTEST:
         return nothing
     same = signal.values[1:] == signal.values[:-1]
     first, last = marked_runs(same)

@@ -50,6 +50,7 @@ class Signal:
     ahead: float = math.inf
     usual: float | None = None
     _period: float | None = field(default=None, init=False, repr=False, compare=False)
+    _longest_repeat: float | None = field(default=None, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         check_text("name of a signal", self.name)
@@ -94,6 +95,17 @@ class Signal:
             object.__setattr__(self, "_period", usual)
             return usual
         return self._period
+
+    @property
+    def longest_repeat(self) -> float:
+        """Longest time over which one value is repeated [s]."""
+        if self._longest_repeat is None:
+            from weighbridge.kernels.interpolation import longest_repeat
+
+            found = longest_repeat(self.time, self.values) if len(self) > 1 else 0.0
+            object.__setattr__(self, "_longest_repeat", float(found))
+            return float(found)
+        return self._longest_repeat
 
     def at(self, time: Floats) -> Floats:
         """Interpolate linearly; NaN outside the samples [SI]."""
