@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from importlib import import_module
 from pathlib import Path
 from typing import Any, get_args
@@ -28,14 +29,26 @@ GROUPS = {
 """Names of ``import weighbridge as wb``, in the order in which a reader meets them."""
 
 MODULES = {
-    "reference/fleet.md": ("Fleet", ("weighbridge.fleet",)),
-    "reference/simulation.md": ("Simulation", ("weighbridge.simulation",)),
-    "reference/parts.md": (
-        "Parts to build on",
-        ("weighbridge.io", "weighbridge.signals", "weighbridge.balance", "weighbridge.estimators"),
-    ),
+    "reference/fleet.md": ("Fleet", "weighbridge.fleet"),
+    "reference/simulation.md": ("Simulation", "weighbridge.simulation"),
 }
-"""Pages by module: title, and the modules whose ``__all__`` they hold."""
+"""Pages by module: title, and the module whose ``__all__`` they hold."""
+
+PARTS = {
+    "weighbridge.io": (
+        "FORMATS", "Format", "Takes", "read_drive", "read_drives", "read_frame", "read_table",
+        "to_frames", "write_drive", "write_mdf", "write_table",
+    ),
+    "weighbridge.signals": (
+        "QUANTITIES", "Bools", "Drive", "DriveInfo", "Floats", "Ints", "Problem", "Quantity",
+        "Signal", "clean_columns", "scalar_to_si",
+    ),
+    "weighbridge.balance": (
+        "REASON_TEXT", "ForceBalance", "ForceTable", "Reason", "force_balance",
+    ),
+    "weighbridge.estimators": ("ESTIMATORS", "Estimator", "MassTrack", "Segment", "Status"),
+}  # fmt: skip
+"""What packages of others build on, by its room; rooms hand out more to each other."""
 
 RECORDS = (
     "weighbridge.vehicle.torque_source.TorqueSource",
@@ -49,8 +62,6 @@ RECIPES = (
     "weighbridge.io.channels.Recording",
     "weighbridge.io.channels.reader",
     "weighbridge.io.channels.drafter",
-    "weighbridge.signals.cleaning.clean_columns",
-    "weighbridge.signals.units.scalar_to_si",
     "weighbridge.vehicle.torque_sources.REPORTED",
     "weighbridge.vehicle.torque_sources.ROUGH",
     "weighbridge.estimators.regression.regression",
@@ -84,20 +95,19 @@ def python_pages() -> dict[str, str]:
         for name in names:
             lines += _entry(f"weighbridge.{name}")
     pages = {"reference/python.md": "\n".join(lines)}
-    for place, (title, modules) in MODULES.items():
-        lines = [f"# {title}", ""]
-        for module in modules:
-            lines += [f"## `{module}`", ""]
-            for name in import_module(module).__all__:
-                lines += _entry(f"{module}.{name}")
-        if place.endswith("parts.md"):
-            lines += ["## Records of entry points", ""]
-            for name in RECORDS:
-                lines += _entry(name)
-            lines += ["## What recipes take besides", ""]
-            for name in RECIPES:
-                lines += _entry(name)
+    for place, (title, module) in MODULES.items():
+        lines = [f"# {title}", "", *_entries(module, import_module(module).__all__)]
         pages[place] = "\n".join(lines)
+    lines = ["# Parts to build on", ""]
+    for module, names in PARTS.items():
+        lines += _entries(module, names)
+    lines += ["## Records of entry points", ""]
+    for name in RECORDS:
+        lines += _entry(name)
+    lines += ["## What recipes take besides", ""]
+    for name in RECIPES:
+        lines += _entry(name)
+    pages["reference/parts.md"] = "\n".join(lines)
     return pages
 
 
@@ -113,6 +123,13 @@ def commands_page() -> str:
     ]
     _tell(get_command(app), "weighbridge", lines)
     return "\n".join(lines)
+
+
+def _entries(module: str, names: Iterable[str]) -> list[str]:
+    lines = [f"## `{module}`", ""]
+    for name in names:
+        lines += _entry(f"{module}.{name}")
+    return lines
 
 
 def _entry(name: str) -> list[str]:
