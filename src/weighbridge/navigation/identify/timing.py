@@ -9,7 +9,7 @@ import numpy as np
 from weighbridge.kernels.interpolation import moved_changes
 from weighbridge.signals import Floats, Signal
 from weighbridge.signals.correlation import inner
-from weighbridge.signals.lag import find_lag, lag_std_at
+from weighbridge.signals.lag import STEP, find_lag, lag_std_at
 
 _SPAN = 1.5
 """Speed changes are compared over this time [s]: longer lets grade in, shorter noise."""
@@ -35,7 +35,7 @@ def estimate_speed_delay(
     time : (n,) instants of the forward specific force, even [s]
     forward : (n,) specific force along the vehicle [m/s^2]
     speed : the speed signal; resampled to at most 10 Hz
-    low, high : delays tried [s]
+    low, high : delays tried first [s]
 
     Returns
     -------
@@ -86,7 +86,7 @@ def estimate_speed_delay(
         left = target - gain * model if gain > 0.0 else target
         return inner(left, left)
 
-    delay = find_lag(residual, low, high, farthest=high + 0.2)
+    delay = find_lag(residual, low, high, farthest=high + STEP)
     if math.isnan(delay) or residual(delay) > 0.7 * inner(target, target):
         return 0.0, np.inf
     # Overlapping spans repeat the same noise.
