@@ -23,6 +23,7 @@ STARTING = (
     "fleet/test_kills.py",
     "fleet/test_learning.py",
     "fleet/test_run.py",
+    "unit/test_damaged_logs.py",
     "unit/test_fault_study.py",
     "unit/test_simulated_fleet.py",
 )
@@ -46,13 +47,15 @@ def starts_processes(item) -> bool:
 def longest_first(items: list) -> None:
     """Put the tests of new and of long files first; within a file the order stays.
 
-    Before them come files that start other programs, while the workers themselves are small.
+    Before them come files that start other programs, while the workers themselves are small: first
+    those that need the browser, which is the largest.
     """
     known = seconds()
     took = {i.path: known.get(i.path.relative_to(ROOT).as_posix(), math.inf) for i in items}
-    large = {i.path for i in items if starts_processes(i) or "chromium" in i.fixturenames}
+    browsing = {item.path for item in items if "chromium" in item.fixturenames}
+    large = browsing | {item.path for item in items if starts_processes(item)}
     starting = large | {item.path for item in items if hasattr(item.module, "subprocess")}
-    files = sorted(took, key=lambda path: (path not in starting, -took[path]))
+    files = sorted(took, key=lambda path: (path not in starting, path not in browsing, -took[path]))
     place = {path: k for k, path in enumerate(one_at_a_time(files, large, took))}
     items.sort(key=lambda item: place[item.path])
 
