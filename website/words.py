@@ -62,10 +62,11 @@ def sentences() -> Iterator[tuple[str, str]]:
 
 
 def references() -> Iterator[tuple[str, str]]:
-    """Yield place and text of the reference: help of the commands, docstrings of public names."""
-    from website import reference
+    """Yield place and text of the reference: commands, numbers, docstrings of public names."""
+    from website import checks, reference
 
     yield "weighbridge --help", reference.commands_page()
+    yield "reference/checks.md", checks.checks_page()
     for page in reference.python_pages().values():
         for name in re.findall(r"^::: (\S+)", page, re.MULTILINE):
             home, _, last = name.rpartition(".")

@@ -1,4 +1,4 @@
-"""Limits that many checks share: what stands and what drives, how sure is sure."""
+"""Limits that many checks share: of speed, of certainty, and of the number of samples."""
 
 from typing import Final
 
@@ -10,7 +10,7 @@ MOVES: Final = 1.0
 and a sensor may well repeat itself."""
 
 CREEPS: Final = 2.0
-"""Slower, a vehicle may creep or be pushed, and its torque says little of the motion [m/s]."""
+"""Slower, a vehicle may creep or be pushed, and its torque shows little of the motion [m/s]."""
 
 DRIVES: Final = 3.0
 """Faster, clutch and converter hardly slip, and a vehicle is driven [m/s]."""
@@ -19,20 +19,23 @@ LOCKED: Final = 6.0
 """Faster, clutch and converter are locked, in front of a stepless gearbox too [m/s]: they lock by
 20 km/h."""
 
-DOUBTED: Final = 2.0
-"""Standard deviations from which something is doubted [-]: one of 22 normal values is farther."""
+POSSIBLE: Final = 2.0
+"""Standard deviations from which a difference is questioned [-]: of normal values one in 22 is
+farther off."""
 
-SURE: Final = 3.0
-"""Standard deviations from which something is shown [-]: one of 370 normal values is farther."""
+SIGNIFICANT: Final = 3.0
+"""Standard deviations from which a difference is real [-]: of normal values one in 370 is farther
+off."""
 
-SURER: Final = 4.0
-"""The same where much hangs on it, or many are looked at [-]: one of 16 000."""
+SURE: Final = 4.0
+"""The same where many differences are looked at, or a mass is refused by one [-]: one in 16 000."""
 
 CERTAIN: Final = 5.0
-"""The same where errors last longer than is reckoned with [-]: one of 1.7 million."""
+"""The same where errors last longer than their standard deviation allows for [-]: one in 1.7
+million."""
 
 PARTS: Final = 12
-"""Parts of a drive that are left out one after another for a standard deviation."""
+"""Parts of a drive that are left out one after another to find a standard deviation."""
 
 FEW: Final = 10
 """Fewer samples show no median."""

@@ -10,7 +10,7 @@ import numpy as np
 from weighbridge.balance.law import force_on_mass
 from weighbridge.balance.table import ForceBalance
 from weighbridge.constants import INDEPENDENT
-from weighbridge.limits import FEWEST_BLOCKS, SURE
+from weighbridge.limits import FEWEST_BLOCKS, SIGNIFICANT
 from weighbridge.messages import Problem
 from weighbridge.navigation import BY_SPEED
 from weighbridge.signals import Bools, Floats
@@ -117,7 +117,7 @@ def _lacking(fast: tuple[Floats, Floats], slow: tuple[Floats, Floats]) -> bool:
     if min(np.count_nonzero(fast[1]), np.count_nonzero(slow[1])) < FEWEST_BLOCKS:
         return False
     ratio, std = _ratio(fast, slow)
-    return ratio + SURE * std < SMOOTHED
+    return ratio + SIGNIFICANT * std < SMOOTHED
 
 
 def _there(fast: tuple[Floats, Floats], slow: tuple[Floats, Floats]) -> bool:

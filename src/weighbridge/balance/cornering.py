@@ -13,7 +13,7 @@ from weighbridge.signals import Bools, Floats
 
 HARD_CORNERING: Final = 3.0
 """Lateral acceleration above which a row is left out [m/s^2]. A tyre runs at a slip angle and
-its side force points backwards by as much: the resistance over the mass is
+its side force points backwards by that angle: the resistance over the mass is
 a_y^2 / (g c), with a cornering stiffness c of 10 to 20 per rad over the load (Gillespie,
 Fundamentals of Vehicle Dynamics, 1992, ch. 6), 0.05 to 0.09 m/s^2 at this limit. That is more
 than the disturbance that the joint estimator expects (0.04 m/s^2), and it lasts through a

@@ -20,7 +20,7 @@ from weighbridge.balance.second_signal import (
     ranges_of,
     rows_of,
 )
-from weighbridge.limits import DOUBTED, SOME
+from weighbridge.limits import POSSIBLE, SOME
 from weighbridge.messages import phrase
 from weighbridge.signals import Drive
 from weighbridge.vehicle import SecondSignalRelation, Vehicle
@@ -32,7 +32,7 @@ SERIOUS: Final = 0.09
 """The same, above which there is no mass [-]: the mass is off by 1.1 to 1.5 times as much."""
 
 SURE: Final = 3.5
-"""Standard deviations by which it has to be off for that, `DOUBTED` to be questioned [-]. So 8 of
+"""Standard deviations by which it has to be off for that, `POSSIBLE` to be questioned [-]. So 8 of
 1184 pairs of calibration and drive of recorded vehicles were questioned (a petrol car's load by
 intake pressure, another's torque by it, an electric car by its battery), and 2 refused beside those
 with a trip whose torque repeats one value to its end."""
@@ -155,7 +155,7 @@ def judged(
 def _verdict(off: float, std: float) -> Verdict:
     if off > max(SERIOUS, SURE * std):
         return "serious"
-    return "doubtful" if off > max(QUESTIONABLE, DOUBTED * std) else "agrees"
+    return "doubtful" if off > max(QUESTIONABLE, POSSIBLE * std) else "agrees"
 
 
 def accepted_scales(

@@ -22,7 +22,7 @@ from weighbridge.balance.foot_setup import (
     turning_at,
 )
 from weighbridge.kernels import two_states
-from weighbridge.limits import DRIVES, SURE
+from weighbridge.limits import DRIVES, SIGNIFICANT
 from weighbridge.signals import Bools, Drive, Floats, Signal
 from weighbridge.vehicle import Vehicle
 
@@ -183,7 +183,7 @@ def _noisy(source: Signal, level: Floats, torque: Floats, setup: FootSetup) -> B
     asked = setup.asked.at(setup.mean(torque, source.time, until))
     clear = asked > level + PUSHED * setup.floor.span
     pushes = ~near(source.time, ~clear, source.time, SETTLED, 0.0 if setup.forward else math.inf)
-    return np.asarray(pushes & (asked - source.values < SURE * setup.asked.noise))
+    return np.asarray(pushes & (asked - source.values < SIGNIFICANT * setup.asked.noise))
 
 
 def _log_odds(above: Floats, scatter: Floats | float, span: float) -> Floats:

@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from weighbridge.balance.floor import FEWEST_IN_BIN, SCATTER, Floor, find_floor
-from weighbridge.limits import MOVES, SURE
+from weighbridge.limits import MOVES, SIGNIFICANT
 from weighbridge.signals import Bools, Drive, Floats, Signal, spread
 from weighbridge.vehicle import DraggedReading, Vehicle
 from weighbridge.vehicle.torque import averaged
@@ -246,7 +246,7 @@ def _reach(floor: Floor, above: Floats) -> float:
     if known.size < FEWEST_IN_BIN:
         return 0.0
     shown = min(float(np.percentile(known, 90.0)), FARTHEST * floor.span)
-    return shown if shown > SURE * floor.scatter else 0.0
+    return shown if shown > SIGNIFICANT * floor.scatter else 0.0
 
 
 def _least(

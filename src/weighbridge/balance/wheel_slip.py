@@ -8,7 +8,7 @@ import numpy as np
 
 from weighbridge.balance.table import ForceTable
 from weighbridge.constants import GRAVITY
-from weighbridge.limits import SURER
+from weighbridge.limits import SURE
 from weighbridge.signals import Drive, Floats
 
 AROUND: Final = 0.5
@@ -91,7 +91,7 @@ def wheel_slip(table: ForceTable, mass: float, drive: Drive) -> WheelSlip | None
             return None
         left = (y - columns @ found) * weight
         noise = 1.4826 * float(np.median(np.abs(left[used])))
-        taken, used = used, np.abs(left) < SURER * noise
+        taken, used = used, np.abs(left) < SURE * noise
     a = columns[taken] * weight[taken, None]
     cov = noise**2 * np.linalg.inv(a.T @ a)
     std, late_std = np.sqrt(cov[1, 1]), np.sqrt(cov[2, 2])

@@ -46,7 +46,7 @@ from weighbridge.messages import phrase, refused
 from weighbridge.navigation import BY_SPEED
 from weighbridge.results import DelaySearch
 from weighbridge.signals import Floats
-from weighbridge.signals.lag import beyond, lowest, parabola
+from weighbridge.signals.lag import STEP, beyond, lowest, parabola
 from weighbridge.vehicle import Driveline, Provenance, RoadLoad, Timing, Vehicle, cold_torque_std
 
 LAGS: Final = (0.0, 0.1, 0.2, 0.3, 0.4)
@@ -59,7 +59,7 @@ USUAL_LAG: Final = 0.15
 LAG_SPREAD: Final = 0.08
 """Its standard deviation [s]."""
 
-DELAYS: Final = tuple(0.2 * k for k in range(-2, 7))
+DELAYS: Final = tuple(STEP * k for k in range(-2, 7))
 """Sums of delay and lag among which the search begins [s]; it goes on beyond an end that fits
 best."""
 

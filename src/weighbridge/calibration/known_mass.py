@@ -14,7 +14,7 @@ from weighbridge.constants import PETROL_HEATING_VALUE
 from weighbridge.errors import ConfigError
 from weighbridge.estimators import joint
 from weighbridge.estimators.joint.problem import UNMODELLED
-from weighbridge.limits import SURE, SURER
+from weighbridge.limits import SIGNIFICANT, SURE
 from weighbridge.messages import Problem, phrase, refused
 from weighbridge.signals import Drive, Floats
 from weighbridge.vehicle import VEHICLE_CLASSES, Vehicle, scale_std, source_of
@@ -132,7 +132,7 @@ def scale_finding(vehicle: Vehicle, masses: list[float], names: str) -> Problem 
         No torque is so far off.
     """
     ratio, std = scale_by_mass(vehicle), scale_std(vehicle)
-    if abs(ratio - 1.0) <= SURE * std:
+    if abs(ratio - 1.0) <= SIGNIFICANT * std:
         return None
     listed = " and ".join(f"{kg:.0f}" for kg in masses)
     likely = " and ".join(f"{kg / ratio:.0f}" for kg in masses)
@@ -286,7 +286,7 @@ def contradicting(
         mean = float(np.average(ratios[others], weights=weight))
         std = float(np.hypot(stds[k], 1.0 / np.sqrt(weight.sum())))
         apart = float(ratios[k]) / mean - 1.0
-        off[k] = apart if abs(apart) > SURER * std else 0.0
+        off[k] = apart if abs(apart) > SURE * std else 0.0
     worst = int(np.argmax(np.abs(off)))
     if abs(off[worst]) <= UNCERTAIN:
         return []

@@ -16,7 +16,7 @@ from weighbridge.signals.instants import instant
 from weighbridge.vehicle import Vehicle
 
 _REPORTED: Final = 5.0
-"""Frozen for less in all is left out without a word [s]."""
+"""Frozen for less in all is left out without a note [s]."""
 
 _AT_LIMIT: Final = 0.05
 """With a larger part of its samples at one extreme value an axis is clipped [-]."""

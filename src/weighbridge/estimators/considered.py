@@ -1,4 +1,4 @@
-"""What the calibration's fit leaves open on this drive: another mix of gears, loads, slopes."""
+"""How uncertain the calibration's fit is on this drive: another mix of gears, loads, slopes."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ from scipy.ndimage import uniform_filter1d
 from weighbridge.balance import ForceBalance
 from weighbridge.balance.law import squat_column
 from weighbridge.constants import GRAVITY, INDEPENDENT
-from weighbridge.limits import DOUBTED, FEWEST_PIECES, MOVES
+from weighbridge.limits import FEWEST_PIECES, MOVES, POSSIBLE
 from weighbridge.messages import Problem, phrase
 from weighbridge.navigation import BY_SPEED, Motion, with_squat
 from weighbridge.signals import Bools, Floats
@@ -116,7 +116,7 @@ def of_vehicle(motion: Motion, vehicle: Vehicle) -> Motion:
     off = motion.squat - float(np.clip(motion.squat, min(ends), max(ends)))
     own_std = float(np.hypot(DRIVE_STD, motion.squat_std or 0.0))
     sureness = abs(off) / float(np.hypot(own_std, mounting.squat_std or 0.0))
-    if sureness < DOUBTED:
+    if sureness < POSSIBLE:
         return with_squat(motion, mounting.squat, LOADED_STD)
     leans = phrase("leans", now=np.degrees(motion.squat), then=np.degrees(mounting.squat))
     if sureness < ANOTHER:

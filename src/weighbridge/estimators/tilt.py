@@ -22,7 +22,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from weighbridge.estimators.joint.load_stops import change_odds
-from weighbridge.limits import SURE
+from weighbridge.limits import SIGNIFICANT
 from weighbridge.signals import Floats
 
 SETTLED: Final = 2.0
@@ -157,7 +157,7 @@ class TiltMap:
     @property
     def weighed(self) -> int:
         """Changes that the motion has weighed."""
-        return sum(abs(s.change) > SURE * math.sqrt(s.change_var) for s in self.stops)
+        return sum(abs(s.change) > SIGNIFICANT * math.sqrt(s.change_var) for s in self.stops)
 
     @cached_property
     def _nodes(self) -> tuple[Floats, Floats, Floats, Floats]:

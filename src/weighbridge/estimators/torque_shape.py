@@ -1,4 +1,4 @@
-"""What the shape of the torque reading leaves open: its error is not the same at every torque.
+"""Uncertainty by the shape of the torque reading: its error is not the same at every torque.
 
 A calibration finds the scale and the offset that fit its drives. What is left of the reading
 bends to and fro from one torque to the next. Ordinary drives average it as the calibration did.

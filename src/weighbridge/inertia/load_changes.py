@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from weighbridge.inertia.filter import InertiaTrack
-from weighbridge.limits import SURER
+from weighbridge.limits import SURE
 from weighbridge.signals import Bools
 
 MERGED: Final = 0.5
@@ -60,7 +60,7 @@ def load_changes(track: InertiaTrack, believed: tuple[float, ...]) -> tuple[floa
         return ()
     ends = np.searchsorted(track.time, (*believed, np.inf)) - 1
     alpha, std = track.alpha[ends, 0], track.alpha_std[ends, 0]
-    moved = np.abs(np.diff(alpha)) > SURER * np.hypot(std[1:], std[:-1])
+    moved = np.abs(np.diff(alpha)) > SURE * np.hypot(std[1:], std[:-1])
     return tuple(time for time, real in zip(believed, moved, strict=True) if real)
 
 
@@ -74,4 +74,4 @@ def believed_otherwise(track: InertiaTrack, begin: int, end: int) -> Bools:
     alpha, std = track.alpha[begin:end], track.alpha_std[begin:end]
     away = np.abs(alpha - alpha[-1])
     # An inertia within some percent leaves little beside the springs' own errors.
-    return np.asarray(np.any(away > np.maximum(SURER * std, 0.05 * alpha[-1]), axis=1))
+    return np.asarray(np.any(away > np.maximum(SURE * std, 0.05 * alpha[-1]), axis=1))

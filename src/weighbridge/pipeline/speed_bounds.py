@@ -19,7 +19,7 @@ from weighbridge.balance.law import rotating_mass
 from weighbridge.constants import GRAVITY
 from weighbridge.errors import ConfigError, DriveError
 from weighbridge.estimators.track import Status
-from weighbridge.limits import SURE
+from weighbridge.limits import SIGNIFICANT
 from weighbridge.navigation import Motion, find_motion, without_accelerometer
 from weighbridge.signals import Drive, Floats
 from weighbridge.signals.instants import instant
@@ -122,7 +122,7 @@ def mass_bound(
         raise ConfigError(f"power_std must be in [0, 0.5), got {power_std}")
     motion = _graded(drive, vehicle)
     start, gain, gain_std, force_work = _windows(drive, motion, vehicle)
-    hard = gain > np.maximum(SURE * gain_std, 1e-9)
+    hard = gain > np.maximum(SIGNIFICANT * gain_std, 1e-9)
     if not hard.any():
         return MassBound(
             mass=math.nan, nearest=math.nan, nearest_std=math.nan, start=math.nan, windows=0,

@@ -58,7 +58,7 @@ _DEEPEST: Final = 100
 
 # So many unknown keys are named; a screen shows no more.
 _SAID: Final = 20
-# Texts that stand in brackets in a message.
+# Texts in brackets of a message.
 _SHOWN: Final = 40
 
 

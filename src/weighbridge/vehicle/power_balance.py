@@ -16,7 +16,7 @@ from typing import Any, Final
 import numpy as np
 
 from weighbridge.constants import INDEPENDENT
-from weighbridge.limits import DOUBTED, MOVES
+from weighbridge.limits import MOVES, POSSIBLE
 from weighbridge.messages import Problem
 from weighbridge.signals import Bools, Drive, Floats, Signal, robust_fit
 from weighbridge.signals.lag import best_lag
@@ -194,7 +194,7 @@ def by_power(drive: Drive, vehicle: Vehicle) -> tuple[Vehicle, tuple[Problem, ..
     weight = usual**2 / (usual**2 + found.std**2)
     scale = 1.0 + weight * (found.scale - 1.0)
     std = math.sqrt(weight) * found.std
-    unusual = abs(found.scale - 1.0) > DOUBTED * math.hypot(usual, found.std)
+    unusual = abs(found.scale - 1.0) > POSSIBLE * math.hypot(usual, found.std)
     if unusual:
         std = math.hypot(std, found.scale - scale)
     offset, slope, *powers = vehicle.torque.coefficients or (0.0, 1.0)

@@ -14,7 +14,7 @@ import numpy as np
 
 from weighbridge.estimators.joint.problem import UNMODELLED, FilterInput
 from weighbridge.kernels import disturbance
-from weighbridge.limits import SURER
+from weighbridge.limits import SURE
 from weighbridge.messages import Problem
 from weighbridge.signals import Drive, Floats
 from weighbridge.vehicle import Vehicle, source_of
@@ -135,7 +135,7 @@ def bent(bend: TorqueBend | None, drive: Drive, vehicle: Vehicle) -> Problem | N
     if set(source.found(drive)) & set(drive.info.trusted):
         return None
     least = BENT if bend.part > 0.0 else TOO_MUCH
-    if abs(bend.part) <= max(least, SURER * bend.std):
+    if abs(bend.part) <= max(least, SURE * bend.std):
         return None
     less = "less" if bend.part > 0.0 else "more"
     return Problem.of(

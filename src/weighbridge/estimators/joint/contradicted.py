@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from weighbridge.estimators.track import MassTrack, Status
-from weighbridge.limits import DOUBTED
+from weighbridge.limits import POSSIBLE
 from weighbridge.messages import Problem
 
 APART: Final = 0.10
@@ -36,7 +36,7 @@ def contradicted(track: MassTrack, joined: MassTrack) -> Problem | None:
         return None
     apart = abs(float(np.log(track.mass / joined.mass)))
     std = float(np.hypot(track.std / track.mass, joined.std / joined.mass))
-    if apart <= max(APART, DOUBTED * std):
+    if apart <= max(APART, POSSIBLE * std):
         return None
     return Problem.of(
         "method.contradicted", method=track.method, mass=track.mass, joint_mass=joined.mass

@@ -11,7 +11,7 @@ from scipy.ndimage import uniform_filter1d
 
 from weighbridge.constants import GRAVITY
 from weighbridge.kernels.rotation import euler_to_matrix
-from weighbridge.limits import MOVES, SURER
+from weighbridge.limits import MOVES, SURE
 from weighbridge.messages import Problem, refused
 from weighbridge.navigation.aiding import Fixes, interpolated, resample, speed_from_fixes
 from weighbridge.navigation.even import Even
@@ -32,7 +32,7 @@ FINE_RATE: Final = 20.0
 """Clock of the delays [Hz]."""
 
 MOST_MOVED: Final = 0.2
-"""A mounting further from the one given, and by `SURER` standard deviations, is another [rad]: a
+"""A mounting further from the one given, and by `SURE` standard deviations, is another [rad]: a
 steady drive hardly shows where ahead is."""
 
 _NOD_BAND: Final = (2.0, 20.0)
@@ -134,7 +134,7 @@ def _merged(found: Alignment, coarse: CoarseMounting) -> tuple[Alignment, Proble
         return own, None
     angle = math.acos(np.clip(0.5 * (np.trace(found.rot_bs @ coarse.rot_bs.T) - 1.0), -1, 1))
     unsure = math.hypot(coarse.yaw_std, coarse.tilt_std, found.tilt_std, found.yaw_std)
-    if angle <= max(MOST_MOVED, SURER * unsure):
+    if angle <= max(MOST_MOVED, SURE * unsure):
         return replace(found, yaw_rate_bias=bias), None
     return own, Problem.of("imu.mounting_moved", angle=math.degrees(angle))
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
 from weighbridge.constants import GRAVITY, INDEPENDENT, SAMPLES_AT_ONCE
-from weighbridge.limits import FEWEST_BLOCKS, MOVES, SURER
+from weighbridge.limits import FEWEST_BLOCKS, MOVES, SURE
 from weighbridge.navigation.axes import Axes
 from weighbridge.navigation.identify.steps import fitted
 from weighbridge.navigation.motion import Motion
@@ -32,7 +32,7 @@ _SURE_TWICE: Final = 2.0
 
 _LEAST: Final = 0.012
 """A smaller error of the scale is left [-]: undamaged simulated drives of five vehicles showed up
-to 0.009, and the mass is off by as much."""
+to 0.009, and the mass is off by the same share."""
 
 _LEFT: Final = 0.002
 """What is left of an error that was found, above which a further round is worth it [-]."""
@@ -65,7 +65,7 @@ filter takes the rest for grade."""
 _SHORT: Final = 3.0
 _LONG: Final = 12.0
 _SMOOTHED: Final = 1.7
-"""A scale is off by as much over `_SHORT` as over `_LONG` [s], 0.9 to 1.3 times in four vehicles; a
+"""A scale is off alike over `_SHORT` and over `_LONG` [s], 0.9 to 1.3 times in four vehicles; a
 speed that is smoothed over 0.7 to 3 s by 2.0 to 3.4 times."""
 
 _CHANGE_SURE: Final = 25.0
@@ -183,7 +183,7 @@ def find_gain(
     noise = max(float(np.mean(error)) - rounding, 0.0) / float(np.mean(shown**2))
     found = Gain(ends, 1.0 / curve, std)
     upheld = not again and _upheld(found, gravity)
-    least = _LEFT if again else max(_LEAST, (_SURE_TWICE if upheld else SURER) * std)
+    least = _LEFT if again else max(_LEAST, (_SURE_TWICE if upheld else SURE) * std)
     if float(np.average(off, weights=weight)) < least + noise or float(np.max(off)) > _MOST:
         return None
     if again or upheld:

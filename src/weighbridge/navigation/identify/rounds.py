@@ -69,7 +69,7 @@ _CLOSER: Final = 0.6
 """A round that finds more than so much of what the one before found leads nowhere [-]."""
 
 _FALSE_REPORTED: Final = 1e-3
-"""A smaller part of false samples is left out without a word [-]."""
+"""A smaller part of false samples is left out without a note [-]."""
 
 
 def navigate(
