@@ -85,6 +85,21 @@ def test_scale_and_losses_are_found_whatever_the_heater_takes(made, sign):
     assert found.driving < 1.1 < 1.0 / found.recuperating
 
 
+@pytest.mark.parametrize(
+    ("late", "found"), [(-0.5, True), (0.7, True), (-4.0, False), (2.0, False), (8.0, False)]
+)
+def test_a_battery_on_another_clock_shows_nothing(made, late, found):
+    """Some tenths of a second are lateness, and found; a farther clock makes no scale."""
+    drive = electrified(made, reads=1.1)
+    meters = [drive.signals[name] for name in ("battery_voltage", "battery_current")]
+    drive = drive.with_signals(*(Signal(s.name, s.time + late, s.values) for s in meters))
+    balance = find_power_balance(drive, sheet())
+    if found:
+        assert balance.scale == pytest.approx(1.1, abs=0.02)
+    else:
+        assert balance is None
+
+
 def test_losses_that_differ_both_ways_stay_in_the_interval(made):
     for one_way in (0.2, 0.8):
         found = find_power_balance(electrified(made, reads=0.97, one_way=one_way), sheet())
