@@ -6,6 +6,7 @@ import functools
 import gc
 import os
 import shutil
+import signal
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -35,6 +36,10 @@ if TYPE_CHECKING:
 # Programs that tests start need not compile all they import, each time.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
+
+# A script that starts the tests in the background lets them ignore interruptions, which some test.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 WORKER = "PYTEST_XDIST_WORKER" in os.environ
 
@@ -187,9 +192,9 @@ def assert_salvaged() -> Callable[[Path], None]:
         except wb.DriveError as e:
             said = str(e)
         assert len(said.splitlines()) == 1
-        for signal in found.values():
-            assert np.isfinite(signal.values).all()
-            assert (np.diff(signal.time) > 0.0).all()
+        for one in found.values():
+            assert np.isfinite(one.values).all()
+            assert (np.diff(one.time) > 0.0).all()
 
     return check
 
