@@ -1,4 +1,4 @@
-"""Public names of a package whose modules are imported when they are first used."""
+"""Names whose modules are imported when they are first used."""
 
 from __future__ import annotations
 
@@ -24,3 +24,19 @@ def at_first_use(package: str, homes: Mapping[str, str]) -> Callable[[str], Any]
         return module if home == f"{package}.{name}" else getattr(module, name)
 
     return found
+
+
+def at_first_call(path: str) -> Callable[..., Any]:
+    """Return a function, or a class to call, whose module is imported when it is first called.
+
+    Parameters
+    ----------
+    path : of the function: package, module and name, with dots
+    """
+    home, _, name = path.rpartition(".")
+
+    def call(*given: Any, **named: Any) -> Any:
+        return getattr(import_module(home), name)(*given, **named)
+
+    call.__module__, call.__name__, call.__qualname__ = home, name, name
+    return call

@@ -8,7 +8,7 @@ from tests.noted import error
 from tests.recipes import code, entry_points
 
 from weighbridge import DriveError, read_drive
-from weighbridge.io import formats
+from weighbridge.io import all_formats
 
 READER = code("bang_logs.py")
 LINE = entry_points()["weighbridge.formats"].replace("FORMAT", "{name}")
@@ -47,7 +47,7 @@ def test_an_installed_package_adds_a_format(install, log):
     sys.path.insert(0, str(log.parent))
     try:
         assert_allclose(read_drive(log).signals["vehicle_speed"].values, [10.0, 11.0, 12.0])
-        assert "Bang" in [f.name for f in formats()]
+        assert "Bang" in [f.name for f in all_formats()]
         # Its folder is a drive as well, and a name that it does not have stays unknown.
         assert read_drive(log.parent).has("vehicle_speed")
     finally:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from weighbridge import read_drive
-from weighbridge.io import draft, mapping_text
+from weighbridge.io import draft_table, mapping_text
 from weighbridge.signals import QUANTITIES, to_si
 
 FOLDER = Path(__file__).parent
@@ -56,7 +56,7 @@ def log(folder, columns, stamps):
 def read(path):
     """Read a log by the mapping that is drafted for it."""
     mapping = path.with_name("map.toml")
-    mapping.write_text(mapping_text([draft(path)]), encoding="utf-8")
+    mapping.write_text(mapping_text([draft_table(path)]), encoding="utf-8")
     return read_drive(path, mapping)
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from weighbridge import Drive, DriveInfo, Signal
 from weighbridge.checks import correct_drive
-from weighbridge.io import draft
+from weighbridge.io import draft_table
 
 NAME = "longitudinal_accel"
 TIME = np.arange(0.0, 1200.0, 0.1)
@@ -64,6 +64,6 @@ def test_what_a_person_vouches_for_stays():
 def test_a_name_tells_that_it_was_calculated(tmp_path, name):
     table = {"Time (s)": TIME, "Speed (km/h)": 3.6 * SPEED, "RPM": 900 + 50 * SPEED, name: ACCEL}
     pl.DataFrame(table).write_csv(tmp_path / "t.csv")
-    found = draft(tmp_path / "t.csv")
+    found = draft_table(tmp_path / "t.csv")
     assert NAME not in {c.quantity for c in found.known}
     assert any("calculated" in doubt for doubt in found.all_questions)

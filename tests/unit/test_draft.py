@@ -8,7 +8,7 @@ import pytest
 from tests.noted import error
 
 from weighbridge import ConfigError, DriveError, WeighbridgeError, read_drive
-from weighbridge.io import draft, load_mapping, mapping_text
+from weighbridge.io import draft_table, load_mapping, mapping_text
 
 ROWS = 400
 T = 0.25 * np.arange(ROWS)
@@ -81,7 +81,7 @@ def epoch(folder):
 @pytest.mark.parametrize("make", [car_scanner, german_sheet, unit_row, no_units, epoch])
 def test_what_was_drafted_reads_the_log(make, tmp_path):
     path = make(tmp_path)
-    found = draft(path)
+    found = draft_table(path)
     mapping = tmp_path / "map.toml"
     mapping.write_text(mapping_text([found]), encoding="utf-8")
     drive = read_drive(path, mapping)
@@ -95,14 +95,14 @@ def test_what_was_drafted_reads_the_log(make, tmp_path):
 
 
 def test_units_that_the_log_states_are_not_doubted_and_others_are(tmp_path):
-    assert draft(car_scanner(tmp_path)).all_questions == ()
-    doubts = " ".join(draft(no_units(tmp_path)).all_questions)
+    assert draft_table(car_scanner(tmp_path)).all_questions == ()
+    doubts = " ".join(draft_table(no_units(tmp_path)).all_questions)
     assert "'VEHICLE_SPEED': states no unit; its highest is" in doubts
     assert "taken as ratio" in doubts
 
 
 def test_columns_that_nobody_needs_are_left_out(tmp_path):
-    found = draft(no_units(tmp_path))
+    found = draft_table(no_units(tmp_path))
     assert {c.quantity for c in found.known} == {"vehicle_speed", "engine_speed", "engine_load"}
     assert "comment" not in mapping_text([found])
 
@@ -116,15 +116,15 @@ def phone(folder, gravity, name, unit=""):
 
 
 def test_gravity_tells_the_unit_of_an_accelerometer(tmp_path):
-    units = [{c.unit for c in draft(phone(tmp_path, g, "a.csv")).known} for g in (9.81, 1.0)]
+    units = [{c.unit for c in draft_table(phone(tmp_path, g, "a.csv")).known} for g in (9.81, 1.0)]
     assert units == [{"mps2"}, {"g"}]
-    gone = draft(phone(tmp_path, 1e-3, "b.csv", " (m/s^2)"))
+    gone = draft_table(phone(tmp_path, 1e-3, "b.csv", " (m/s^2)"))
     assert "gravity was taken out of it" in " ".join(gone.all_questions)
 
 
 def test_several_files_of_a_drive_get_a_table_each(tmp_path):
     obd, imu = car_scanner(tmp_path), phone(tmp_path, 9.81, "imu [1].csv")
-    text = mapping_text([draft(obd), draft(imu)])
+    text = mapping_text([draft_table(obd), draft_table(imu)])
     (tmp_path / "map.toml").write_text(text, encoding="utf-8")
     tables = load_mapping(tmp_path / "map.toml")
     assert len(tables) == 2
@@ -146,7 +146,7 @@ def test_several_files_of_a_drive_get_a_table_each(tmp_path):
 def test_what_cannot_be_drafted_is_one_sentence(lines, words, tmp_path):
     path = written(tmp_path / "x.csv", lines)
     with error(DriveError, words) as told:
-        draft(path)
+        draft_table(path)
     assert str(told.value).startswith(str(path))
     assert "\n" not in str(told.value)
 
@@ -154,7 +154,7 @@ def test_what_cannot_be_drafted_is_one_sentence(lines, words, tmp_path):
 def test_a_unit_that_is_not_known_is_told_and_the_column_left_out(tmp_path):
     rows = [f"{t:.2f},{2.0 + 0.01 * t:.3f},50,7" for t in T]
     head = "Time (s),MAF air flow rate (lb/day),Vehicle speed (km/h),Wheel speed FL (km/h)"
-    found = draft(written(tmp_path / "maf.csv", [head, *rows]))
+    found = draft_table(written(tmp_path / "maf.csv", [head, *rows]))
     assert [c.quantity for c in found.known] == ["vehicle_speed"]
     assert "its unit 'lb/day' is not known" in " ".join(found.all_questions)
 
@@ -162,7 +162,7 @@ def test_a_unit_that_is_not_known_is_told_and_the_column_left_out(tmp_path):
 def test_empty_columns_and_text_are_told(tmp_path):
     rows = [f"{t:.2f},,about 2100,50" for t in T]
     head = "Time (s),Engine Torque (Nm),Engine RPM,Vehicle speed (km/h)"
-    doubts = " ".join(draft(written(tmp_path / "x.csv", [head, *rows])).all_questions)
+    doubts = " ".join(draft_table(written(tmp_path / "x.csv", [head, *rows])).all_questions)
     assert "not taken for engine_torque: it has no values" in doubts
     assert "not taken for engine_speed: its cells are no numbers" in doubts
 
@@ -172,7 +172,7 @@ def test_a_head_that_ends_within_a_character_is_still_utf_8(tmp_path):
     for shift in ("", "x"):
         rows = [f"{k},{v:.1f},{shift}{'ü' * 5000}" for k, v in enumerate(SPEED)]
         path = written(tmp_path / "log.csv", ["time_s,Geschwindigkeit [km/h],Länge", *rows])
-        found = draft(path)
+        found = draft_table(path)
         assert {c.name: c.quantity for c in found.columns} == {
             "Geschwindigkeit [km/h]": "vehicle_speed",
             "Länge": "",
@@ -182,14 +182,14 @@ def test_a_head_that_ends_within_a_character_is_still_utf_8(tmp_path):
 def test_cells_longer_than_a_csv_reader_takes_are_one_sentence_or_a_draft(tmp_path):
     rows = [f'{k},{v:.1f},"{"y" * 140_000}"' for k, v in enumerate(SPEED[:40])]
     path = written(tmp_path / "log.csv", ["time_s,Vehicle speed (km/h),Text", *rows])
-    assert [c.quantity for c in draft(path).known] == ["vehicle_speed"]
+    assert [c.quantity for c in draft_table(path).known] == ["vehicle_speed"]
 
 
 def test_a_name_with_a_line_end_stays_in_its_comment(tmp_path):
     names = ["Time (s)", "Vehicle speed\n(km/h)", "RPM\r\n[rpm]"]
     frame = pl.DataFrame(dict(zip(names, (T, SPEED, RPM), strict=True)))
     frame.write_parquet(tmp_path / "log.parquet")
-    text = mapping_text([draft(tmp_path / "log.parquet")])
+    text = mapping_text([draft_table(tmp_path / "log.parquet")])
     (tmp_path / "map.toml").write_text(text)
     drive = read_drive(tmp_path / "log.parquet", tmp_path / "map.toml")
     np.testing.assert_allclose(drive.signals["vehicle_speed"].values, SPEED / 3.6)
@@ -200,7 +200,7 @@ def test_decimal_commas_in_a_sparse_table(tmp_path):
     rows = [f"13:45:{k:02d}.0;" + (f"{k},5;;;" if k % 2 else f";{800 + k},5;;") for k in range(50)]
     header = "Zeit;Geschwindigkeit (OBD) (km/h);Motordrehzahl (U/min);Last;Öl"
     path.write_text("\n".join([header, *rows]) + "\n", encoding="utf-8")
-    found = draft(path)
+    found = draft_table(path)
     assert found.text.decimal == ","
     assert {c.quantity for c in found.known} == {"vehicle_speed", "engine_speed"}
 
@@ -213,7 +213,7 @@ def clock_rows(stamps, rest):
 def test_a_clock_of_any_name_is_the_time(tmp_path, name):
     rows = clock_rows(range(90), "0;820,5")
     path = written(tmp_path / "obd.csv", [f"{name};Speed [km/h];Obroty [obr/min]", *rows])
-    found = draft(path)
+    found = draft_table(path)
     assert (found.time, found.time_format, found.row_rate) == (name, "clock", None)
     assert found.duration == pytest.approx(89 * 60.0)
     assert any("rises as one" in d for d in found.questions) == (name == "Uur")
@@ -222,7 +222,7 @@ def test_a_clock_of_any_name_is_the_time(tmp_path, name):
 @pytest.mark.parametrize("stamps", [[7] * 40, [50 - k for k in range(40)]])
 def test_a_clock_that_does_not_rise_is_not_the_time(tmp_path, stamps):
     rows = clock_rows(stamps, "0;820,5")
-    found = draft(written(tmp_path / "obd.csv", ["Start;Speed [km/h];RPM", *rows]))
+    found = draft_table(written(tmp_path / "obd.csv", ["Start;Speed [km/h];RPM", *rows]))
     assert found.time == ""
     assert found.rate_unknown
 
@@ -233,7 +233,7 @@ def test_a_time_of_another_name_is_found(tmp_path, name):
     stamps = 1_741_000_000_000 + 200 * np.arange(100)
     columns = {"speed_kmh": np.arange(100.0), name: stamps, "count": np.arange(100) % 7}
     pl.DataFrame(columns).write_parquet(path)
-    found = draft(path)
+    found = draft_table(path)
     assert (found.time, found.time_unit) == (name, "ms")
     assert found.known[0].rate == pytest.approx(5.0)
     assert any("rises as one" in d for d in found.questions)
@@ -248,7 +248,7 @@ def test_the_torque_of_a_retarder_is_taken_and_its_sign_doubted(tmp_path, sign, 
         "ActualRetarderPercentTorque": sign * np.clip(np.arange(100.0) - 60.0, 0.0, 50.0),
     }
     pl.DataFrame(columns).write_parquet(path)
-    found = {c.quantity: c for c in draft(path).known}["retarder_torque"]
+    found = {c.quantity: c for c in draft_table(path).known}["retarder_torque"]
     assert found.unit == "pct"
     assert ("factor = -1" in found.question) == doubted
 
@@ -260,7 +260,7 @@ def test_a_row_of_units_tells_that_of_the_time(tmp_path, unit, step, seconds):
     path = tmp_path / "log.csv"
     rows = [f"{k * step:.1f},{20 + k % 5},{1500 + k % 7}" for k in range(300)]
     path.write_text("\n".join(["Time,Speed,RPM", f"{unit},km/h,1/min", *rows]), encoding="utf-8")
-    (tmp_path / "map.toml").write_text(mapping_text([draft(path)]), encoding="utf-8")
+    (tmp_path / "map.toml").write_text(mapping_text([draft_table(path)]), encoding="utf-8")
     drive = read_drive(path, tmp_path / "map.toml")
     assert drive.signals["vehicle_speed"].period == pytest.approx(seconds)
 
@@ -271,7 +271,7 @@ def test_parquet_by_its_short_suffix_is_drafted(tmp_path):
     for suffix in (".parquet", ".pq"):
         path = tmp_path / f"log{suffix}"
         frame.write_parquet(path)
-        texts.append(mapping_text([draft(path)]).replace(suffix, ""))
+        texts.append(mapping_text([draft_table(path)]).replace(suffix, ""))
     assert texts[0] == texts[1]
 
 
@@ -287,7 +287,7 @@ def counted(folder, name="Sample", above=(), lost=()):
 
 def test_rows_that_are_counted_are_a_clock_once_their_rate_is_known(tmp_path):
     path = counted(tmp_path, lost=(50, 51, 52))
-    found = draft(path)
+    found = draft_table(path)
     assert found.time == "Sample"
     assert found.rate_unknown
     assert "does not state how many there are per second" in found.questions[0]
@@ -304,7 +304,7 @@ def test_rows_that_are_counted_are_a_clock_once_their_rate_is_known(tmp_path):
 
 def test_a_rate_above_the_header_is_taken(tmp_path):
     for line in ("Sample Rate: 4 Hz", '"Sample Rate","4.000"', "Logging rate = 4,0 Hz;"):
-        found = draft(counted(tmp_path, above=["Session,12", line]))
+        found = draft_table(counted(tmp_path, above=["Session,12", line]))
         assert (found.row_rate, found.known[0].rate) == (4.0, pytest.approx(4.0))
         assert found.duration == pytest.approx(T[-1])
         text = mapping_text([found])
@@ -315,7 +315,7 @@ def test_a_rate_above_the_header_is_taken(tmp_path):
 def test_a_table_without_any_time_has_the_number_of_its_rows(tmp_path):
     rows = [f"{v:.2f},{n:.0f}" for v, n in zip(SPEED, RPM, strict=True)]
     path = written(tmp_path / "x.csv", ["Vehicle Speed (km/h),Engine RPM", *rows])
-    found = draft(path)
+    found = draft_table(path)
     assert (found.time, found.rate_unknown, found.rows) == ("", True, ROWS)
     assert "no column can be its time" in found.questions[0]
     signals = {"vehicle_speed": {"column": "Vehicle Speed (km/h)"}}
@@ -327,7 +327,7 @@ def test_a_table_without_any_time_has_the_number_of_its_rows(tmp_path):
 
 def test_a_clock_goes_before_a_counter(tmp_path):
     rows = [f"{k},{t},{v:.1f}" for k, (t, v) in enumerate(zip(T, SPEED, strict=True))]
-    found = draft(written(tmp_path / "x.csv", ["Index,Time (s),Speed (km/h)", *rows]))
+    found = draft_table(written(tmp_path / "x.csv", ["Index,Time (s),Speed (km/h)", *rows]))
     assert found.time == "Time (s)"
     assert found.row_rate is None
 
@@ -338,13 +338,13 @@ def test_a_date_goes_before_milliseconds_since_the_start(tmp_path):
         for t, v in zip(T, SPEED, strict=True)
     ]
     path = written(tmp_path / "log.csv", ["time_ms,date,Vehicle speed (km/h)", *rows])
-    assert draft(path).time == "date"
+    assert draft_table(path).time == "date"
 
 
 def test_a_counter_that_falls_or_leaps_counts_no_rows(tmp_path):
     for numbers in (np.arange(ROWS) % 256, 3 * np.arange(ROWS)):
         rows = [f"{k},{v:.1f}" for k, v in zip(numbers, SPEED, strict=True)]
-        found = draft(written(tmp_path / "x.csv", ["Counter,Speed (km/h)", *rows]))
+        found = draft_table(written(tmp_path / "x.csv", ["Counter,Speed (km/h)", *rows]))
         assert found.time == ""
 
 
@@ -367,11 +367,11 @@ def test_the_speed_of_a_table_with_positions_is_doubted_where_its_name_does_not_
     rows = [f"{t},{v:.1f},48.1,11.5,1500" for t, v in zip(T, SPEED, strict=True)]
     for name, doubts in (("Speed", True), ("GPS Speed", False), ("OBD Speed", False)):
         head = f"Time (s),{name} (km/h),Latitude (deg),Longitude (deg),Engine RPM"
-        found = draft(written(tmp_path / "x.csv", [head, *rows]))
+        found = draft_table(written(tmp_path / "x.csv", [head, *rows]))
         assert any("does not say which" in d for d in found.all_questions) == doubts
     head = "Time (s),Speed (km/h),Latitude (deg),Longitude (deg),comment"
     # Of a table that has nothing else of the vehicle it is the satellites'.
-    found = draft(written(tmp_path / "x.csv", [head, *rows]))
+    found = draft_table(written(tmp_path / "x.csv", [head, *rows]))
     assert "gnss_speed" in {c.quantity for c in found.known}
     assert not found.all_questions
 
@@ -407,7 +407,7 @@ def aim_race_studio(folder):
 @pytest.mark.parametrize("make", [hp_tuners, aim_race_studio])
 def test_what_stands_around_the_names_is_left_out(make, tmp_path):
     path = make(tmp_path)
-    found = draft(path)
+    found = draft_table(path)
     assert "mass_air_flow" not in {c.quantity for c in found.known}
     (tmp_path / "map.toml").write_text(mapping_text([found]), encoding="utf-8")
     drive = read_drive(path, tmp_path / "map.toml")
@@ -421,8 +421,8 @@ def test_columns_of_a_text_without_a_header_are_named_in_their_order(tmp_path):
     rows = [f"{v:.2f};{1000.0 * t:.0f};7;{n:.0f}" for t, v, n in zip(T, SPEED, RPM, strict=True)]
     path = written(tmp_path / "bare.csv", rows)
     with error(DriveError, "bare.csv 60.00;0;7;1800 4 --columns"):
-        draft(path)
-    found = draft(path, ["speed_kmh", "time_ms", "-", "rpm"])
+        draft_table(path)
+    found = draft_table(path, ["speed_kmh", "time_ms", "-", "rpm"])
     assert found.rows == ROWS
     mapping = tmp_path / "map.toml"
     mapping.write_text(mapping_text([found]), encoding="utf-8")
@@ -434,7 +434,7 @@ def test_columns_of_a_text_without_a_header_are_named_in_their_order(tmp_path):
 def test_a_first_row_of_a_clock_and_empty_cells_is_no_header(tmp_path):
     rows = [row + ";;" for row in clock_rows(range(90), "0")]
     with error(DriveError, "obd.csv 08:00:02,610;0;; 4 --columns"):
-        draft(written(tmp_path / "obd.csv", rows))
+        draft_table(written(tmp_path / "obd.csv", rows))
 
 
 @pytest.mark.parametrize(
@@ -447,12 +447,12 @@ def test_a_first_row_of_a_clock_and_empty_cells_is_no_header(tmp_path):
 def test_names_that_do_not_fit_the_columns_are_refused(tmp_path, names, said):
     path = written(tmp_path / "bare.csv", [f"{k},2,3" for k in range(1, 30)])
     with error(DriveError, said):
-        draft(path, names)
+        draft_table(path, names)
 
 
 def test_names_given_by_hand_go_in_place_of_a_header(tmp_path):
     path = no_units(tmp_path)
-    found = draft(path, ["Date", "speed_kmh", "rpm", "-", "-"])
+    found = draft_table(path, ["Date", "speed_kmh", "rpm", "-", "-"])
     assert [c.quantity for c in found.known] == ["vehicle_speed", "engine_speed"]
     assert found.rows == ROWS
 
@@ -461,7 +461,7 @@ def test_each_column_has_the_rate_that_reading_finds(tmp_path):
     """Two rows of each second, one quantity in every fourth row."""
     rows = [f"{k // 2},{50 + k % 9},{'' if k % 4 else 60}" for k in range(2400)]
     path = written(tmp_path / "log.csv", ["Time [s],Speed [km/h],Engine load [%]", *rows])
-    found = draft(path)
+    found = draft_table(path)
     mapping = tmp_path / "map.toml"
     mapping.write_text(mapping_text([found]), encoding="utf-8")
     drive = read_drive(path, mapping)
@@ -474,7 +474,7 @@ def test_each_column_has_the_rate_that_reading_finds(tmp_path):
 def test_a_gap_does_not_lower_the_rate(tmp_path):
     """Ten values a second for two minutes, with an hour between."""
     rows = [f"{k / 10 + 3600 * (k >= 600)},{50 + k % 9}" for k in range(1200)]
-    found = draft(written(tmp_path / "log.csv", ["Time [s],Speed [km/h]", *rows]))
+    found = draft_table(written(tmp_path / "log.csv", ["Time [s],Speed [km/h]", *rows]))
     assert found.known[0].rate == pytest.approx(10.0)
 
 
@@ -499,7 +499,7 @@ def test_a_counter_of_minutes_is_no_clock_beside_one(tmp_path):
         "Runtime ECU": np.floor(MINUTES).astype(int) + 7,
         "Distance": np.floor(10 * MINUTES).astype(int),
     }
-    found = draft(driven(tmp_path, clocks))
+    found = draft_table(driven(tmp_path, clocks))
     assert (found.time, found.time_unit) == ("Runtime ECU", "s")
     assert found.duration == pytest.approx(899.0)
 
@@ -509,7 +509,7 @@ def test_a_counter_of_minutes_is_no_clock_beside_one(tmp_path):
 )
 def test_a_counter_of_minutes_alone_is_told(tmp_path, name):
     """By its name, or by the speed that no vehicle changes so fast."""
-    found = draft(driven(tmp_path, {name: (MINUTES // 60 + 7).astype(int)}))
+    found = draft_table(driven(tmp_path, {name: (MINUTES // 60 + 7).astype(int)}))
     assert (found.time, found.time_unit) == (name, "min")
     assert any("minutes" in doubt for doubt in found.questions)
 
@@ -526,7 +526,7 @@ def test_a_counter_of_minutes_that_a_mapping_names_is_serious(tmp_path, unit):
 
 def test_of_two_clocks_the_one_in_which_a_vehicle_moves_is_taken(tmp_path):
     clocks = {"Time (s)": np.round(MINUTES / 100.0, 4), "Timestamp (s)": np.round(MINUTES, 2)}
-    found = draft(driven(tmp_path, clocks))
+    found = draft_table(driven(tmp_path, clocks))
     assert found.time == "Timestamp (s)"
 
 
@@ -557,7 +557,7 @@ BODY = [f"{t:.2f},{v:.0f},{n:.0f},{x}," for t, v, n, x in zip(T, SPEED, RPM, LOA
 )  # fmt: skip
 def test_a_preamble_with_the_separator_of_the_table_hides_no_header(tmp_path, head):
     path = written(tmp_path / "log.csv", [*head, *BODY])
-    found = draft(path)
+    found = draft_table(path)
     known = {c.quantity: c.unit for c in found.known}
     assert known == {"vehicle_speed": "kmh", "engine_speed": "rpm", "engine_load": "pct"}
     drive = read_drive(path, tomllib.loads(mapping_text([found])))
@@ -572,7 +572,7 @@ def test_units_behind_the_numbers_of_cells(tmp_path):
         speed = "None" if k % 50 == 7 else f"{v / 1.609344:.2f} mile_per_hour"
         lines.append(f"{t:.2f},{n:.1f} revolutions_per_minute,{speed},{x} percent")
     path = written(tmp_path / "obd.csv", lines)
-    found = draft(path)
+    found = draft_table(path)
     units = {c.quantity: (c.unit, c.stated) for c in found.known}
     assert units == {
         "engine_speed": ("rpm", True),
@@ -591,5 +591,5 @@ def test_cells_of_two_units_are_no_numbers(tmp_path):
         f"{t:.2f},{n:.0f} {'rpm' if t < 9 else 'Hz'},{v}"
         for t, n, v in zip(T, RPM, SPEED, strict=True)
     ]
-    found = draft(written(tmp_path / "obd.csv", lines))
+    found = draft_table(written(tmp_path / "obd.csv", lines))
     assert "engine_speed" not in {c.quantity for c in found.known}

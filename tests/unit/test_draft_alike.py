@@ -8,7 +8,7 @@ import polars as pl
 import pytest
 
 import weighbridge as wb
-from weighbridge.io import draft
+from weighbridge.io import draft_table
 
 TIME = np.arange(0.0, 20.0, 0.1)
 
@@ -68,6 +68,6 @@ def test_a_torque_without_unit_is_a_percent_beside_its_reference(
     columns = {"trq_act": np.linspace(-0.1 * high, high, TIME.size), "eng_rpm": TIME + 900.0}
     if reference is not None:
         columns["trq_ref"] = np.full(TIME.size, reference)
-    known = {c.name: c for c in draft(day(tmp_path / "a.parquet", **columns)).known}
+    known = {c.name: c for c in draft_table(day(tmp_path / "a.parquet", **columns)).known}
     assert (known["trq_act"].quantity, known["trq_act"].unit) == (quantity, unit)
     assert "states no unit" in known["trq_act"].question

@@ -5,7 +5,7 @@ import pytest
 from tests.noted import error
 
 from weighbridge import DriveError, read_drive
-from weighbridge.io import draft, mapping_text
+from weighbridge.io import draft_table, mapping_text
 from weighbridge.io.naming import recognise_all
 
 ROWS = 100
@@ -31,7 +31,7 @@ def table(folder, names, name="log.csv", units=()):
     ],
 )
 def test_a_unit_that_does_not_fit_is_named(tmp_path, name, quantity, unit):
-    found = draft(table(tmp_path, ["time_s", name, "Load (%)"]))
+    found = draft_table(table(tmp_path, ["time_s", name, "Load (%)"]))
     assert {c.quantity for c in found.known} == {"engine_load"}
     doubt = next(d for d in found.all_questions if name in d)
     assert f"not taken for {quantity}: its unit {unit!r}" in doubt
@@ -40,7 +40,7 @@ def test_a_unit_that_does_not_fit_is_named(tmp_path, name, quantity, unit):
 
 def test_the_unit_of_a_row_of_units_is_named(tmp_path):
     names, units = ["time", "Engine speed", "Engine load", "Speed"], ["s", "beats", "%", "km/h"]
-    found = draft(table(tmp_path, names, units=units))
+    found = draft_table(table(tmp_path, names, units=units))
     assert "'Engine speed': not taken for engine_speed: its unit 'beats'" in found.all_questions[0]
 
 
@@ -78,7 +78,7 @@ def test_a_sensor_that_was_not_taken_is_told(weighbridge, tmp_path, names, said)
 
 def test_pound_feet_and_thousandths_are_units(tmp_path):
     names = ["time_s", "Engine Torque [lb-ft]", "acc_x [mg]", "gyro_x [mdps]"]
-    columns = {c.quantity: c for c in draft(table(tmp_path, names)).known}
+    columns = {c.quantity: c for c in draft_table(table(tmp_path, names)).known}
     assert {q: c.unit for q, c in columns.items()} == {
         "engine_torque": "lbft", "accel_x": "mg", "gyro_x": "mdegps",
     }  # fmt: skip
@@ -90,28 +90,28 @@ def test_words_behind_the_numbers_of_a_column_are_no_unit(tmp_path):
     rows = [f"{k},{50 + k % 2} or so,{k}" for k in range(ROWS)]
     path = tmp_path / "log.csv"
     path.write_text("\n".join(["Time (s),Speed (km/h),Load (%)", *rows]))
-    assert {c.quantity: c.unit for c in draft(path).known}["vehicle_speed"] == "kmh"
+    assert {c.quantity: c.unit for c in draft_table(path).known}["vehicle_speed"] == "kmh"
 
 
 def test_cells_that_are_no_numbers_are_shown(tmp_path):
     rows = [f"{k},v{50 + k % 2},{k}" for k in range(ROWS)]
     path = tmp_path / "log.csv"
     path.write_text("\n".join(["Time (s),Speed (km/h),Load (%)", *rows]))
-    (doubt,) = (d for d in draft(path).all_questions if "Speed" in d)
+    (doubt,) = (d for d in draft_table(path).all_questions if "Speed" in d)
     assert "its cells are no numbers, such as 'v50'" in doubt
 
 
 def test_lines_that_end_in_carriage_returns_alone_are_told(tmp_path):
     (tmp_path / "mac.csv").write_bytes(b"time_s,rpm\r0,900\r1,950\r2,980\r")
     with error(DriveError, "mac.csv Macintosh"):
-        draft(tmp_path / "mac.csv")
+        draft_table(tmp_path / "mac.csv")
 
 
 @pytest.mark.parametrize("date", ["06.05.2024", "06/05/2024"])
 def test_dates_with_a_decimal_comma_are_the_time(tmp_path, date):
     rows = [f"{date} 11:58:{k // 10:02d},{k % 10}00;{50 + k % 9};{900 + k}" for k in range(ROWS)]
     (tmp_path / "x.csv").write_text("\n".join(["Zeit;v [km/h];Drehzahl [1/min]", *rows]))
-    found = draft(tmp_path / "x.csv")
+    found = draft_table(tmp_path / "x.csv")
     assert found.duration == pytest.approx(0.1 * (ROWS - 1))
     (tmp_path / "x.toml").write_text(mapping_text([found]))
     drive = read_drive(tmp_path / "x.csv", tmp_path / "x.toml")

@@ -7,7 +7,7 @@ import polars as pl
 import pytest
 
 from weighbridge import read_drive
-from weighbridge.io import draft, format_of, mapping_text
+from weighbridge.io import draft_table, format_of, mapping_text
 from weighbridge.signals import UNITS
 
 TIME = np.arange(0.0, 900.0, 0.5)
@@ -51,7 +51,7 @@ def test_whole_numbers_of_another_unit_show_the_unit(tmp_path, unit, whole):
 def test_whole_numbers_of_its_own_show_nothing(tmp_path):
     shown = np.round(3.6 * SPEED)
     pl.DataFrame({"time_s": TIME, "Vehicle speed": shown}).write_csv(tmp_path / "t.csv")
-    assert "its highest is" in draft(tmp_path / "t.csv").columns[0].question
+    assert "its highest is" in draft_table(tmp_path / "t.csv").columns[0].question
 
 
 def test_fleet_telemetry_with_positions_is_in_mph(tmp_path):
@@ -84,7 +84,7 @@ def test_whole_numbers_of_positions_are_read(tmp_path, names, factor, unit):
     table = {"time_s": TIME, "Vehicle speed (km/h)": 3.6 * SPEED, "RPM": 900 + 50 * SPEED}
     table |= {n: np.round(factor * v).astype(int) for n, v in zip(names, place, strict=True)}
     pl.DataFrame(table).write_csv(tmp_path / "t.csv")
-    found = draft(tmp_path / "t.csv")
+    found = draft_table(tmp_path / "t.csv")
     (tmp_path / "m.toml").write_text(mapping_text([found]), encoding="utf-8")
     drive = read_drive(tmp_path / "t.csv", tmp_path / "m.toml")
     assert [c.unit for c in found.columns if c.quantity in ("latitude", "longitude")] == [unit] * 2

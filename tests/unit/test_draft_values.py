@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from weighbridge.io import draft
+from weighbridge.io import draft_table
 
 DT = 0.5
 T = np.arange(0.0, 400.0, DT)
@@ -22,7 +22,7 @@ def drafted(tmp_path, columns):
     lines += [",".join(f"{x:.6g}" for x in row) for row in rows]
     path = tmp_path / "log.csv"
     path.write_text("\n".join(lines) + "\n")
-    found = draft(path)
+    found = draft_table(path)
     return {c.quantity: c.name for c in found.known}, found
 
 

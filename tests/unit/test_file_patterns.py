@@ -8,7 +8,7 @@ import polars as pl
 import pytest
 
 from weighbridge import DriveError, read_drive
-from weighbridge.io import draft, mapping_text
+from weighbridge.io import draft_table, mapping_text
 
 T = np.arange(0.0, 30.0, 0.1)
 
@@ -88,7 +88,9 @@ def test_files_whose_names_tell_no_kind_keep_a_table_each(mapped, tmp_path):
 def test_a_table_beside_a_file_that_is_none_is_for_its_own_names(tmp_path):
     phone, notes = recorded(tmp_path / "a", "20210305_180000")
     notes.write_text("hello world")
-    (tmp_path / "map.toml").write_text(mapping_text([draft(phone)], [notes]), encoding="utf-8")
+    (tmp_path / "map.toml").write_text(
+        mapping_text([draft_table(phone)], [notes]), encoding="utf-8"
+    )
     assert "accel_z" in read_drive(tmp_path / "a", tmp_path / "map.toml").signals
 
 

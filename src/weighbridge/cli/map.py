@@ -210,13 +210,15 @@ def _files(
 ) -> list[tuple[Path, Callable[[Path], Draft]]]:
     """Files named, those of folders included, each with what drafts its mapping."""
     from weighbridge.errors import DriveError
-    from weighbridge.io import format_of, formats, is_log, load_dbcs
+    from weighbridge.io import all_formats, format_of, is_log, load_dbcs
     from weighbridge.io.formats import unreadable
     from weighbridge.io.paths import partitions
 
     databases = load_dbcs(list(dbc))
 
-    drafted = tuple(dict.fromkeys(s for f in formats() if f.draft is not None for s in f.suffixes))
+    drafted = tuple(
+        dict.fromkeys(s for f in all_formats() if f.draft is not None for s in f.suffixes)
+    )
     found = []
     for path in logs:
         if path.is_dir():
@@ -262,7 +264,7 @@ def _draft(
     The DBC of a folder may be that of other files ``beside`` it: without frames it is not asked.
     """
     from weighbridge.errors import DriveError
-    from weighbridge.io import draft, draft_bus, format_of
+    from weighbridge.io import draft_bus, draft_table, format_of
     from weighbridge.io.bus_draft import NoFramesError
 
     try:
@@ -283,10 +285,10 @@ def _draft(
                 return channels(log)
 
         return by_frames
-    if names and form.draft is not draft:
+    if names and form.draft is not draft_table:
         raise DriveError(f"{path} names what it holds itself; leave out --columns")
     if names:
-        return lambda log: draft(log, names)
+        return lambda log: draft_table(log, names)
     return form.draft
 
 

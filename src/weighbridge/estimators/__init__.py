@@ -1,32 +1,24 @@
 """Estimators of the mass, one per file, each with its paper."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from weighbridge.balance import ForceBalance
 from weighbridge.errors import ConfigError
-from weighbridge.estimators import (
-    ekf,
-    fathy,
-    holm,
-    hybrid,
-    joint,
-    ritter,
-    rls,
-    robust_rls,
-    speed_ekf,
-    speed_torque_ekf,
-    vahidi,
-)
-from weighbridge.estimators.joint.contradicted import contradicted
-from weighbridge.estimators.rls import RlsSettings, block_jackknife, run_in_turn
 from weighbridge.estimators.settings import changed, differences, parsed
 from weighbridge.estimators.track import MassTrack, Segment, Status
+from weighbridge.first_use import at_first_call, at_first_use
 from weighbridge.registry import Registry
 from weighbridge.signals import Drive
 from weighbridge.vehicle import Vehicle
 from weighbridge.vehicle.fits import JOINT, RLS, SPEED_EKF, SPEED_TORQUE_EKF
+
+if TYPE_CHECKING:
+    from weighbridge.estimators.joint.contradicted import contradicted
+    from weighbridge.estimators.rls import RlsSettings, block_jackknife, run_in_turn
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,7 +30,7 @@ class Estimator:
     name : of the method
     estimate : makes a track of a balance and a vehicle; takes ``settings`` as third argument,
         where it has any
-    settings : class of its settings; None where it has none
+    settings : makes its usual settings, such as their class; None where it has none
     fits : names of the calibrations whose torque it weighs right with, the best first; other
         torques bias its masses
     speed_alone : it needs a speed and no torque, and takes a balance of
@@ -57,7 +49,7 @@ class Estimator:
 
     name: str
     estimate: Callable[..., MassTrack]
-    settings: type[Any] | None = None
+    settings: Callable[[], Any] | None = None
     fits: tuple[str, ...]
     speed_alone: bool = False
     by_speed: bool = False
@@ -86,6 +78,11 @@ class Estimator:
         return self.estimate(balance, vehicle, settings)
 
 
+def _of(path: str) -> Callable[..., Any]:
+    """Return a function of an estimator; the modules of the others are not imported for it."""
+    return at_first_call(f"{__name__}.{path}")
+
+
 _ANY_TORQUE: Final = (RLS.name, JOINT.name)
 
 ESTIMATORS: Final = Registry(
@@ -94,8 +91,8 @@ ESTIMATORS: Final = Registry(
     (
         Estimator(
             name="joint",
-            estimate=joint.estimate,
-            settings=joint.JointSettings,
+            estimate=_of("joint.batch.estimate"),
+            settings=_of("joint.settings.JointSettings"),
             fits=(JOINT.name,),
             segments_are_loads=True,
             reckons_fuel=True,
@@ -103,69 +100,84 @@ ESTIMATORS: Final = Registry(
         ),
         Estimator(
             name="rls",
-            estimate=rls.estimate,
-            settings=rls.RlsSettings,
+            estimate=_of("rls.estimate"),
+            settings=_of("rls.RlsSettings"),
             fits=_ANY_TORQUE,
-            own_balance=rls.printed_balance,
+            own_balance=_of("rls.printed_balance"),
         ),
         Estimator(
             name="robust-rls",
-            estimate=robust_rls.estimate,
-            settings=robust_rls.RobustRlsSettings,
+            estimate=_of("robust_rls.estimate"),
+            settings=_of("robust_rls.RobustRlsSettings"),
             fits=_ANY_TORQUE,
         ),
-        Estimator(name="ekf", estimate=ekf.estimate, settings=ekf.EkfSettings, fits=_ANY_TORQUE),
+        Estimator(
+            name="ekf",
+            estimate=_of("ekf.estimate"),
+            settings=_of("ekf.EkfSettings"),
+            fits=_ANY_TORQUE,
+        ),
         Estimator(
             name="hybrid",
-            estimate=hybrid.estimate,
-            settings=hybrid.HybridSettings,
+            estimate=_of("hybrid.estimate"),
+            settings=_of("hybrid.HybridSettings"),
             fits=_ANY_TORQUE,
         ),
         Estimator(
-            name=speed_torque_ekf.METHOD,
-            estimate=speed_torque_ekf.estimate,
-            settings=speed_torque_ekf.SpeedTorqueSettings,
+            name="speed-torque-ekf",
+            estimate=_of("speed_torque_ekf.estimate"),
+            settings=_of("speed_torque_ekf.SpeedTorqueSettings"),
             fits=(SPEED_TORQUE_EKF.name,),
             by_speed=True,
         ),
         Estimator(
             name="speed-ekf",
-            estimate=speed_ekf.estimate,
-            settings=speed_ekf.SpeedEkfSettings,
+            estimate=_of("speed_ekf.estimate"),
+            settings=_of("speed_ekf.SpeedEkfSettings"),
             fits=(SPEED_EKF.name,),
             speed_alone=True,
         ),
         Estimator(
-            name=vahidi.METHOD,
-            estimate=vahidi.estimate,
-            settings=vahidi.VahidiSettings,
+            name="vahidi-rls",
+            estimate=_of("vahidi.estimate"),
+            settings=_of("vahidi.VahidiSettings"),
             fits=_ANY_TORQUE,
             compared=False,
         ),
         Estimator(
-            name=holm.METHOD,
-            estimate=holm.estimate,
-            settings=holm.HolmSettings,
+            name="holm-ekf",
+            estimate=_of("holm.estimate"),
+            settings=_of("holm.HolmSettings"),
             fits=_ANY_TORQUE,
             compared=False,
         ),
         Estimator(
-            name=ritter.METHOD,
-            estimate=ritter.estimate,
-            settings=ritter.RitterSettings,
+            name="ritter-batch",
+            estimate=_of("ritter.estimate"),
+            settings=_of("ritter.RitterSettings"),
             fits=_ANY_TORQUE,
             compared=False,
         ),
         Estimator(
-            name=fathy.METHOD,
-            estimate=fathy.estimate,
-            settings=fathy.FathySettings,
+            name="fathy-events",
+            estimate=_of("fathy.estimate"),
+            settings=_of("fathy.FathySettings"),
             fits=_ANY_TORQUE,
             compared=False,
         ),
     ),
 )
 """Every method of `weighbridge weigh`, in the order to show them."""
+
+__getattr__ = at_first_use(
+    __name__,
+    {
+        "RlsSettings": "weighbridge.estimators.rls",
+        "block_jackknife": "weighbridge.estimators.rls",
+        "contradicted": "weighbridge.estimators.joint.contradicted",
+        "run_in_turn": "weighbridge.estimators.rls",
+    },
+)
 
 __all__ = [
     "ESTIMATORS",

@@ -138,7 +138,7 @@ class UnknownColumnsError(DriveError):
         self.found = found
 
 
-def draft(path: Path, names: Sequence[str] = ()) -> Draft:
+def draft_table(path: Path, names: Sequence[str] = ()) -> Draft:
     """Look at a table and draft how it is to be read.
 
     Parameters

@@ -12,31 +12,15 @@ import sys
 from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Any, Final
 
-from weighbridge.io import (
-    apps,
-    blf,
-    frame_text,
-    gpx,
-    grouped,
-    hdf5,
-    json_lines,
-    long_csv,
-    matlab,
-    mdf,
-    messages,
-    nmea,
-    npy,
-    openpilot,
-    tabular,
-    tdms,
-    vbo,
-)
-from weighbridge.io.channels import drafter, reader
-from weighbridge.io.draft import draft
+from weighbridge.first_use import at_first_call
 from weighbridge.io.format import Format, Takes, starts_with
-from weighbridge.io.log import Reader
+from weighbridge.io.log import Log, Reader
+from weighbridge.io.mapping import TableMapping
+
+if TYPE_CHECKING:
+    from weighbridge.io.draft import Draft
 
 _logger = logging.getLogger(__name__)
 
@@ -44,6 +28,37 @@ GROUP: Final = "weighbridge.formats"
 """Entry points by which packages add formats."""
 
 _HEAD: Final = 4096
+
+
+def _of(path: str) -> Callable[..., Any]:
+    """Return a function of a reader; the modules of the others are not imported for it."""
+    return at_first_call(f"{__package__}.{path}")
+
+
+draft_table: Final[Callable[..., Draft]] = _of("draft.draft_table")
+"""Drafts the mapping of a table, whose columns may be named by hand."""
+
+
+def _reader(opener: str) -> Reader:
+    """Return the reader of a format of channels, by the name of what opens its files."""
+
+    def read(path: Path, table: str | None, mapping: TableMapping | None) -> Log:
+        from weighbridge.io.channels import reader
+
+        return reader(_of(opener))(path, table, mapping)
+
+    return read
+
+
+def _drafter(opener: str) -> Callable[[Path], Draft]:
+    """Return what drafts the mapping of a format of channels, likewise."""
+
+    def draft(path: Path) -> Draft:
+        from weighbridge.io.channels import drafter
+
+        return drafter(_of(opener))(path)
+
+    return draft
 
 
 def _frames(
@@ -66,116 +81,134 @@ FORMATS: Final[tuple[Format, ...]] = (
     Format(
         name="CSV",
         suffixes=(".csv", ".tsv", ".txt", ".msl"),
-        read=tabular.read_csv,
+        read=_of("tabular.read_csv"),
         about="a table of text: canonical names, or those of a mapping",
         takes=Takes.TEXT,
-        draft=draft,
+        draft=draft_table,
     ),
     _frames(
         "table of CAN frames",
         (".csv", ".tsv", ".txt"),
-        frame_text.read_frame_table,
-        frame_text.is_frame_table,
+        _of("frame_text.read_frame_table"),
+        _of("frame_text.is_frame_table"),
         about="CAN frames, one a row under names, as python-can, SavvyCAN, CLX000, Kvaser and "
         "Vehicle Spy write them",
     ),
     Format(
         name="RaceChrono CSV v3",
         suffixes=(".csv",),
-        read=apps.read_racechrono,
-        begins=apps.is_racechrono,
+        read=_of("apps.read_racechrono"),
+        begins=_of("apps.is_racechrono"),
         about="position, speeds and engine speed, by source",
         takes=Takes.PLAIN,
-        draft=draft,
+        draft=draft_table,
     ),
     Format(
         name="Torque Pro CSV",
         suffixes=(".csv",),
-        read=apps.read_torque_pro,
-        begins=apps.is_torque_pro,
+        read=_of("apps.read_torque_pro"),
+        begins=_of("apps.is_torque_pro"),
         about="position, OBD values with the unit in their name",
         takes=Takes.PLAIN,
-        draft=draft,
+        draft=draft_table,
     ),
     Format(
         name="Sensor Logger CSV",
         suffixes=(".csv",),
-        read=apps.read_sensor_logger,
-        begins=apps.is_sensor_logger,
+        read=_of("apps.read_sensor_logger"),
+        begins=_of("apps.is_sensor_logger"),
         about="total acceleration, rotation and location of a phone",
         takes=Takes.PLAIN,
-        draft=draft,
+        draft=draft_table,
     ),
     Format(
         name="Tesla Track Mode CSV",
         suffixes=(".csv",),
-        read=apps.read_track_mode,
-        begins=apps.is_track_mode,
+        read=_of("apps.read_track_mode"),
+        begins=_of("apps.is_track_mode"),
         about="speed, position, accelerator, over all laps",
         takes=Takes.PLAIN,
-        draft=draft,
+        draft=draft_table,
     ),
     Format(
         name="long CSV",
         suffixes=(".csv", ".tsv", ".txt"),
-        read=reader(long_csv.open_long),
-        begins=long_csv.is_long,
+        read=_reader("long_csv.open_long"),
+        begins=_of("long_csv.is_long"),
         about="one row for each value, with its name, as Car Scanner writes it",
         takes=Takes.COLUMNS,
-        draft=drafter(long_csv.open_long),
+        draft=_drafter("long_csv.open_long"),
     ),
     Format(
         name="Haltech CSV",
         suffixes=(".csv",),
-        read=reader(apps.open_haltech),
-        begins=apps.is_haltech,
+        read=_reader("apps.open_haltech"),
+        begins=_of("apps.is_haltech"),
         about="channels of an engine's control unit, as NSP exports them",
         takes=Takes.CHANNELS,
-        draft=drafter(apps.open_haltech),
+        draft=_drafter("apps.open_haltech"),
     ),
     Format(
         name="grouped CSV",
         suffixes=(".csv", ".tsv", ".txt"),
-        read=grouped.read_grouped,
-        begins=grouped.is_grouped,
+        read=_of("grouped.read_grouped"),
+        begins=_of("grouped.is_grouped"),
         about="several times side by side, each for the columns to its right, as VCDS writes them",
         takes=Takes.TEXT,
-        draft=grouped.draft_grouped,
+        draft=_of("grouped.draft_grouped"),
     ),
     Format(
         name="Parquet",
         suffixes=(".parquet", ".pq"),
-        read=tabular.read_pq,
+        read=_of("tabular.read_pq"),
         begins=starts_with(b"PAR1"),
         magic=True,
         about="a table: canonical names, or those of a mapping",
         takes=Takes.COLUMNS,
-        draft=draft,
+        draft=draft_table,
     ),
     Format(
         name="MDF",
         suffixes=(".mf4", ".mdf"),
-        read=mdf.read_mdf,
+        read=_of("mdf.read_mdf"),
         begins=starts_with(b"MDF ", b"UnFinMF"),
         magic=True,
         about="measurement channels, and CAN frames of bus logging",
         takes=Takes.CHANNELS,
-        draft=mdf.draft,
+        draft=_of("mdf.draft"),
         package="asammdf",
         extra="mdf",
     ),
-    _frames("BLF", (".blf",), blf.read_blf, starts_with(b"LOGG"), magic=True),
-    _frames("ASC", (".asc",), frame_text.read_asc),
-    _frames("TRC", (".trc",), frame_text.read_trc),
-    _frames("candump", (".log",), frame_text.read_candump),
-    _frames("candump text", (".txt",), frame_text.read_candump, frame_text.is_candump, magic=True),
-    _frames("OVMS CRTD", (".crtd", ".log", ".txt"), frame_text.read_crtd, frame_text.is_crtd),
-    _frames("CanKing", (".txt", ".log"), frame_text.read_canking, frame_text.is_canking),
-    _frames("BUSMASTER", (".log", ".txt"), frame_text.read_busmaster, frame_text.is_busmaster),
+    _frames("BLF", (".blf",), _of("blf.read_blf"), starts_with(b"LOGG"), magic=True),
+    _frames("ASC", (".asc",), _of("frame_text.read_asc")),
+    _frames("TRC", (".trc",), _of("frame_text.read_trc")),
+    _frames("candump", (".log",), _of("frame_text.read_candump")),
+    _frames(
+        "candump text",
+        (".txt",),
+        _of("frame_text.read_candump"),
+        _of("frame_text.is_candump"),
+        magic=True,
+    ),
+    _frames(
+        "OVMS CRTD",
+        (".crtd", ".log", ".txt"),
+        _of("frame_text.read_crtd"),
+        _of("frame_text.is_crtd"),
+    ),
+    _frames(
+        "CanKing", (".txt", ".log"), _of("frame_text.read_canking"), _of("frame_text.is_canking")
+    ),
+    _frames(
+        "BUSMASTER",
+        (".log", ".txt"),
+        _of("frame_text.read_busmaster"),
+        _of("frame_text.is_busmaster"),
+    ),
     Format(
         name="NMEA 0183",
         suffixes=(".nmea", ".ubx"),
-        read=nmea.read_nmea,
+        read=_of("nmea.read_nmea"),
         about="RMC, GGA, GNS, GST, VTG of any talker",
         takes=Takes.CLOCK,
         self_described=True,
@@ -185,8 +218,8 @@ FORMATS: Final[tuple[Format, ...]] = (
     Format(
         name="NMEA text",
         suffixes=(".txt", ".log"),
-        read=nmea.read_nmea,
-        begins=nmea.is_nmea,
+        read=_of("nmea.read_nmea"),
+        begins=_of("nmea.is_nmea"),
         magic=True,
         about="the same, known by its first lines, which may begin with what an app writes",
         takes=Takes.CLOCK,
@@ -197,7 +230,7 @@ FORMATS: Final[tuple[Format, ...]] = (
     Format(
         name="GPX",
         suffixes=(".gpx",),
-        read=gpx.read_gpx,
+        read=_of("gpx.read_gpx"),
         about="track points with time",
         takes=Takes.CLOCK,
         self_described=True,
@@ -207,7 +240,7 @@ FORMATS: Final[tuple[Format, ...]] = (
     Format(
         name="VBOX",
         suffixes=(".vbo",),
-        read=vbo.read_vbo,
+        read=_of("vbo.read_vbo"),
         about="position, speed, height, brake trigger; CAN columns by a mapping",
         takes=Takes.CHANNELS,
         self_described=True,
@@ -215,7 +248,7 @@ FORMATS: Final[tuple[Format, ...]] = (
     Format(
         name="NumPy",
         suffixes=(".npy",),
-        read=npy.read_npy,
+        read=_of("npy.read_npy"),
         begins=starts_with(b"\x93NUMPY"),
         magic=True,
         about="columns by number, with a mapping",
@@ -224,43 +257,43 @@ FORMATS: Final[tuple[Format, ...]] = (
     Format(
         name="MATLAB",
         suffixes=(".mat",),
-        read=reader(matlab.open_mat),
+        read=_reader("matlab.open_mat"),
         begins=starts_with(b"MATLAB 5.0", b"MATLAB 7.3"),
         magic=True,
         about="arrays and structures, of any version",
         takes=Takes.NUMBERS,
         package="pymatreader",
         extra="mat",
-        draft=drafter(matlab.open_mat),
+        draft=_drafter("matlab.open_mat"),
     ),
     Format(
         name="HDF5",
         suffixes=(".h5", ".hdf5", ".hdf"),
-        read=reader(hdf5.open_hdf5),
+        read=_reader("hdf5.open_hdf5"),
         begins=starts_with(b"\x89HDF\r\n\x1a\n"),
         magic=True,
         about="data sets in groups, tables",
         takes=Takes.NUMBERS,
         package="h5py",
         extra="hdf5",
-        draft=drafter(hdf5.open_hdf5),
+        draft=_drafter("hdf5.open_hdf5"),
     ),
     Format(
         name="TDMS",
         suffixes=(".tdms",),
-        read=reader(tdms.open_tdms),
+        read=_reader("tdms.open_tdms"),
         begins=starts_with(b"TDSm"),
         magic=True,
         about="channels and waveforms of LabVIEW",
         takes=Takes.NUMBERS,
         package="npTDMS",
         extra="tdms",
-        draft=drafter(tdms.open_tdms),
+        draft=_drafter("tdms.open_tdms"),
     ),
     Format(
         name="MCAP",
         suffixes=(".mcap",),
-        read=reader(messages.open_mcap),
+        read=_reader("messages.open_mcap"),
         begins=starts_with(b"\x89MCAP0\r\n"),
         magic=True,
         about="Imu and NavSatFix of ROS 1, ROS 2 or JSON; numbers of other messages by a mapping",
@@ -268,24 +301,24 @@ FORMATS: Final[tuple[Format, ...]] = (
         self_described=True,
         package="mcap",
         extra="ros",
-        draft=drafter(messages.open_mcap),
+        draft=_drafter("messages.open_mcap"),
     ),
     Format(
         name="ROS bag",
         suffixes=(".bag", ".db3"),
-        read=reader(messages.open_bag),
+        read=_reader("messages.open_bag"),
         begins=starts_with(b"#ROSBAG V2.0"),
         about="Imu and NavSatFix of ROS 1 or ROS 2; numbers of other messages by a mapping",
         takes=Takes.CHANNELS,
         self_described=True,
         package="rosbags",
         extra="ros",
-        draft=drafter(messages.open_bag),
+        draft=_drafter("messages.open_bag"),
     ),
     Format(
         name="openpilot",
         suffixes=("rlog", "rlog.bz2", "rlog.zst", "qlog", "qlog.bz2", "qlog.zst"),
-        read=reader(openpilot.open_openpilot),
+        read=_reader("openpilot.open_openpilot"),
         about="speed, engine speed, pedals, inertial sensor, position; CAN frames with a DBC",
         takes=Takes.CHANNELS,
         self_described=True,
@@ -296,41 +329,41 @@ FORMATS: Final[tuple[Format, ...]] = (
         name="Tesla Fleet Telemetry JSON",
         # A .json is read where it is named: in a folder it is rather a result or a setting.
         suffixes=(".jsonl", ".ndjson"),
-        read=reader(json_lines.open_fleet_telemetry),
-        begins=json_lines.is_fleet_telemetry,
+        read=_reader("json_lines.open_fleet_telemetry"),
+        begins=_of("json_lines.is_fleet_telemetry"),
         magic=True,
         about="position; numbers by a mapping, for the protocol states no units",
         takes=Takes.CHANNELS,
-        draft=drafter(json_lines.open_fleet_telemetry),
+        draft=_drafter("json_lines.open_fleet_telemetry"),
     ),
     Format(
         name="JSON lines",
         suffixes=(".jsonl", ".ndjson"),
-        read=reader(json_lines.open_json_lines),
-        begins=json_lines.is_json_lines,
+        read=_reader("json_lines.open_json_lines"),
+        begins=_of("json_lines.is_json_lines"),
         magic=True,
         about="one object a line: a value with its name, as OpenXC has it, or a row of values",
         takes=Takes.COLUMNS,
-        draft=drafter(json_lines.open_json_lines),
+        draft=_drafter("json_lines.open_json_lines"),
     ),
 )
 """The formats of this project; where several have one suffix, the first that recognises a file's
 first bytes reads it, else the one that needs no recognising, else the last."""
 
 
-def formats() -> tuple[Format, ...]:
+def all_formats() -> tuple[Format, ...]:
     """All formats, those that packages add included."""
     return (*FORMATS, *_added(tuple(sys.path)))
 
 
 def suffixes() -> tuple[str, ...]:
     """Ends of file names that are read, each once."""
-    return tuple(dict.fromkeys(s for f in formats() for s in f.suffixes))
+    return tuple(dict.fromkeys(s for f in all_formats() for s in f.suffixes))
 
 
 def is_log(path: Path) -> bool:
     """Return by its name whether a file is read as a log."""
-    return any(f.ends(path.name) for f in formats())
+    return any(f.ends(path.name) for f in all_formats())
 
 
 _SHEET: Final = "it is a spreadsheet: save its sheet as CSV"
@@ -409,14 +442,14 @@ def format_of(path: Path) -> Format | None:
     OSError
         It cannot be opened.
     """
-    known = [(f.ends(path.name), f) for f in formats()]
+    known = [(f.ends(path.name), f) for f in all_formats()]
     longest = max(length for length, _ in known)
     named = [f for length, f in known if length == longest > 0]
     if len(named) == 1:
         return named[0]
     with path.open("rb") as file:
         head = file.read(_HEAD)
-    among = named or [f for f in formats() if f.magic]
+    among = named or [f for f in all_formats() if f.magic]
     for found in among:
         if found.begins is not None and found.begins(head):
             return found

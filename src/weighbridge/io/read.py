@@ -14,7 +14,6 @@ import numpy as np
 
 from weighbridge.errors import ConfigError, DriveError
 from weighbridge.io import tabular
-from weighbridge.io.bus import decode
 from weighbridge.io.clocks import settle_clocks, shift_clock
 from weighbridge.io.dbc import Database, DbcSource, load_dbcs
 from weighbridge.io.filled_positions import true_fixes
@@ -23,7 +22,6 @@ from weighbridge.io.formats import format_of, is_log, suffixes, unreadable
 from weighbridge.io.frames import Frames, join_frames, settle_clock
 from weighbridge.io.info import FILE_NAME as INFO_NAME
 from weighbridge.io.info import read_info
-from weighbridge.io.left_out import left_out
 from weighbridge.io.log import Log
 from weighbridge.io.mapping import (
     MappingSource,
@@ -260,7 +258,9 @@ def _read_known(
         raise DriveError(f"{error.what}: {how_to_name(folder)}") from None
     source = mappings[0].source if mappings else ""
     others = [f for f in there if f not in {path for path, _ in known}]
-    if logs:
+    if logs and others:
+        from weighbridge.io.left_out import left_out
+
         logs[0].problems += left_out(folder, others, source)
     return logs
 
@@ -454,6 +454,8 @@ def _decode_frames(
     mapping = next((m for log in raw if (m := mapping_for(log.path, mappings))), None)
     joined = join_frames([frames for _, frames in parts])
     known = {s.name for log in logs for s in log.signals}
+    from weighbridge.io.bus import decode
+
     try:
         found = decode(joined, name, mapping, databases)
     except DriveError as error:

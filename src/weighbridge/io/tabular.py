@@ -21,8 +21,6 @@ from weighbridge.io.columns import (
     parse_column,
     time_unit,
 )
-from weighbridge.io.draft_text import of_numbers
-from weighbridge.io.draft_time import counts_minutes, minutes_problem
 from weighbridge.io.log import Log
 from weighbridge.io.mapping import (
     MappedSignal,
@@ -32,7 +30,6 @@ from weighbridge.io.mapping import (
     lacking,
     resolved_unit,
 )
-from weighbridge.io.naming import recognise
 from weighbridge.io.parquet import read_parquet
 from weighbridge.io.table import (
     SEPARATORS,
@@ -208,6 +205,8 @@ def _mapped_time(raw: RawTable, mapping: TableMapping, log: Log) -> tuple[Floats
     if rate is not None:
         rows, notes = raw.numbers(index)
         return rows / rate, notes
+    from weighbridge.io.draft_time import counts_minutes, minutes_problem
+
     name = raw.names[index]
     if counts_minutes(name):
         log.problems.append(minutes_problem(raw.path.name, name))
@@ -245,6 +244,8 @@ def _no_time(raw: RawTable, known: bool) -> DriveError:
 
 def _named_hint(raw: RawTable) -> str:
     """What to do about a mapping whose columns are not there."""
+    from weighbridge.io.draft_text import of_numbers
+
     parts = [cell.strip() for name in raw.names for cell in _PARTED.split(name) if cell.strip()]
     if raw.separator and parts and of_numbers(parts):
         names = json.dumps([TIME_COLUMN, "vehicle_speed_kmh", "-"])
@@ -287,6 +288,8 @@ def _near(column: str, raw: RawTable) -> str:
 
 def _column_named(name: str) -> str:
     """Canonical column that a logger's name means; empty where its name shows none surely."""
+    from weighbridge.io.naming import recognise
+
     found = recognise(name)
     if not found.quantity or found.score < 1.0:
         return ""
