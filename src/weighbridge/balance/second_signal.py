@@ -13,11 +13,19 @@ from dataclasses import dataclass, replace
 from typing import Final, TypeAlias
 
 import numpy as np
-from scipy.ndimage import median_filter
 
 from weighbridge.errors import DriveError
 from weighbridge.limits import CREEPS, LOCKED, PARTS, SOME
-from weighbridge.signals import Bools, Drive, Floats, Ints, Signal, robust_fit, robust_fits
+from weighbridge.signals import (
+    Bools,
+    Drive,
+    Floats,
+    Ints,
+    Signal,
+    median_of_three,
+    robust_fit,
+    robust_fits,
+)
 from weighbridge.signals.interpolation import interpolate
 from weighbridge.signals.lag import best_lag
 from weighbridge.vehicle import SecondSignalRelation, Vehicle, source_of
@@ -197,7 +205,7 @@ def rows_of(
         return None  # Percent of an unknown torque: weighing says so.
     gearing = vehicle.driveline.gearings[0] if turning_of.name == "vehicle_speed" else 1.0
     # One false value would be in all that is divided by it, or filtered.
-    steady = replace(turning_of, values=median_filter(turning_of.values, 3, mode="nearest"))
+    steady = replace(turning_of, values=median_of_three(turning_of.values))
     moved = time - later
     turning = steady.at(moved) * gearing
     value = second_signal.of(drive, moved, turning)

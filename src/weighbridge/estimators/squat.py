@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
 
 from weighbridge.balance import ForceBalance
 from weighbridge.balance.law import squat_column
@@ -15,7 +14,7 @@ from weighbridge.constants import GRAVITY, INDEPENDENT
 from weighbridge.limits import FEWEST_PIECES, MOVES, POSSIBLE
 from weighbridge.messages import Problem, phrase
 from weighbridge.navigation import BY_SPEED, Motion, with_squat
-from weighbridge.signals import Bools, Floats
+from weighbridge.signals import Bools, Floats, moving_mean
 from weighbridge.vehicle import Vehicle, VehicleClass
 
 SQUAT: Final = (0.0035, 0.0025)
@@ -191,10 +190,10 @@ def squat_by_speed(motion: Motion) -> tuple[float, float] | None:
     moving = motion.valid & (motion.speed > MOVES)
     around = max(round(AVERAGED * rate), 1), max(round(BRIEF * rate), 1)
     parts = [
-        uniform_filter1d(x, around[0]) - uniform_filter1d(x, around[1])
+        moving_mean(x, around[0], "symmetric") - moving_mean(x, around[1], "symmetric")
         for x in (motion.specific_force, np.gradient(motion.speed, 1.0 / rate))
     ]
-    inside = uniform_filter1d(moving.astype(np.float64), around[1]) > 0.999
+    inside = moving_mean(moving.astype(np.float64), around[1], "symmetric") > 0.999
     block = (motion.time[inside] // INDEPENDENT).astype(np.int64)
     read, rolled = (x[inside] for x in parts)
     _, block = np.unique(block, return_inverse=True)

@@ -7,11 +7,9 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from scipy.fft import irfft, next_fast_len, rfft
-from scipy.ndimage import uniform_filter1d
 
 from weighbridge.kernels.interpolation import integral
-from weighbridge.signals import Bools, Floats, Signal, resolution
+from weighbridge.signals import Bools, Floats, Signal, moving_mean, resolution
 from weighbridge.signals.interpolation import interpolate
 from weighbridge.signals.lag import lag_std, parabola
 
@@ -142,7 +140,7 @@ def find_lags(force: Integrated, speed: Signal, *, centre: float = 0.0) -> Lags:
     most = round(REACH[-1] / STEP)
     wide: Floats = np.asarray(start - centre + STEP * np.arange(-most, count + most))
     changes, felt = _force_changes(force, wide)
-    axes = np.column_stack([_high_passed(c, felt) for c in changes])
+    axes = np.column_stack([*_high_passed(np.array(changes), felt)])
     lively = [k for k in lively if np.mean(felt[k + most : k + most + size]) > _SEEN]
     found: dict[int, tuple[float, float]] = {}
     for reach in (round(r / STEP) for r in REACH):
@@ -176,6 +174,8 @@ def find_offset(force: Integrated, speed: Signal) -> float | None:
     -------
     Coarse, to be refined by `find_lags`; None where no lag explains much.
     """
+    from scipy.fft import irfft, next_fast_len, rfft  # Slow to load, and seldom needed.
+
     first, last = force.start, force.end
     start, end = float(speed.time[0]), float(speed.time[-1])
     if min(last - first, end - start) < _PIECE:
@@ -183,7 +183,7 @@ def find_offset(force: Integrated, speed: Signal) -> float | None:
     x, seen = _speed_changes(speed, np.arange(start, end, STEP))
     x = _high_passed(x, seen)
     changes, felt = _force_changes(force, np.arange(first, last, STEP))
-    axes = np.column_stack([_high_passed(c, felt) for c in changes])
+    axes = np.column_stack([*_high_passed(np.array(changes), felt)])
     gram = axes.T @ axes
     gram += 1e-6 * np.trace(gram) * np.eye(3) + 1e-12 * np.eye(3)
     size = next_fast_len(x.size + axes.shape[0], real=True)
@@ -222,7 +222,7 @@ def locate_step(
     sides = []
     for lag in lags:
         changes, felt = _force_changes(force, grid - lag)
-        sides.append(np.column_stack([_high_passed(c, felt) for c in changes]))
+        sides.append(np.column_stack([*_high_passed(np.array(changes), felt)]))
         seen &= felt
     sure = seen & ((grid < cut[0]) | (grid > cut[1]))
     rows = np.where((grid < cut[0])[:, None], sides[0], sides[1])[sure]
@@ -279,11 +279,10 @@ def _change(time: Floats, y: Floats, grid: Floats) -> Floats:
 
 
 def _high_passed(y: Floats, seen: Bools) -> Floats:
-    """Take off the moving mean of what was seen; 0 where nothing was."""
+    """Take off the moving mean of what was seen, of y (n,) or (k, n); 0 where nothing was."""
     width = round(_LEVEL / STEP) | 1
-    weight = np.maximum(uniform_filter1d(seen.astype(np.float64), width, mode="nearest"), 1e-9)
-    mean = uniform_filter1d(y, width, mode="nearest")
-    return np.where(seen, y - mean / weight, 0.0)
+    weight = np.maximum(moving_mean(seen.astype(np.float64), width, "edge"), 1e-9)
+    return np.where(seen, y - moving_mean(y, width, "edge") / weight, 0.0)
 
 
 def _peak(explained: Floats, enough: Bools, size: int) -> tuple[float, float] | None:
@@ -349,10 +348,9 @@ def _explained_in_gaps(
         enough[k] = np.count_nonzero(both) >= _SEEN * np.count_nonzero(seen)
         if not enough[k]:
             continue
-        x = _high_passed(np.where(both, shown, 0.0), both)
-        rows = np.column_stack(
-            [_high_passed(np.where(both, c[k : k + shown.size], 0.0), both) for c in changes]
-        )
+        moved = np.array([shown, *(c[k : k + shown.size] for c in changes)])
+        x, *axes = _high_passed(np.where(both, moved, 0.0), both)
+        rows = np.column_stack(axes)
         gram = rows.T @ rows
         gram += 1e-6 * np.trace(gram) * np.eye(3) / 3.0 + 1e-12 * np.eye(3)
         cross = rows.T @ x

@@ -13,6 +13,7 @@ from weighbridge.signals.lag import (
     lowest,
     parabola,
 )
+from weighbridge.signals.moving import moving_mean
 from weighbridge.signals.parts import find_restarts, find_splices, numbered, parted
 from weighbridge.signals.recent import BEHIND, LONGEST_STEP, STEP, STEPS, recent, step_ends
 from weighbridge.signals.robust import (
@@ -67,6 +68,7 @@ __all__ = [
     "lowest",
     "median_of_three",
     "median_slope",
+    "moving_mean",
     "numbered",
     "parabola",
     "parted",

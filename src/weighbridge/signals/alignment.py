@@ -8,10 +8,9 @@ from typing import Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.fft import irfft, next_fast_len, rfft
-from scipy.ndimage import uniform_filter1d
 
 from weighbridge.limits import PARTS
+from weighbridge.signals.moving import moving_mean
 from weighbridge.signals.signal import Bools, Floats, Signal
 
 STEP: Final = 0.1
@@ -136,8 +135,8 @@ def _gridded(signal: Signal) -> tuple[Floats, Bools]:
     seen = (signal.age(time) <= max(2.0 * signal.period, 1.5)) & np.isfinite(values)
     values = np.where(seen, values, 0.0)
     width = max(int(LEVEL / STEP), 1)
-    weight = uniform_filter1d(seen.astype(np.float64), width, mode="constant")
-    mean = uniform_filter1d(values, width, mode="constant") / np.maximum(weight, 1e-9)
+    weight = moving_mean(seen.astype(np.float64), width, "constant")
+    mean = moving_mean(values, width, "constant") / np.maximum(weight, 1e-9)
     return np.where(seen, values - mean, 0.0), seen
 
 
@@ -154,6 +153,8 @@ def _correlations(a: Floats, seen_a: Bools, b: Floats, seen_b: Bools) -> tuple[F
     -------
     rho, count : (n_a + n_b - 1,); entry k is for b moved by k - (n_b - 1) samples
     """
+    from scipy.fft import irfft, next_fast_len, rfft  # Slow to load, and seldom needed.
+
     size = a.size + b.size - 1
     length = next_fast_len(size, real=True)
 

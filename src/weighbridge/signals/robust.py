@@ -122,7 +122,9 @@ def robust_fits(columns: Floats, y: Floats) -> tuple[Floats, Floats]:
 def median_of_three(values: Floats) -> Floats:
     """Return the median of each value (n,) and its neighbours; the ends stand twice."""
     padded = np.concatenate((values[:1], values, values[-1:]))
-    return np.asarray(np.median([padded[:-2], padded[1:-1], padded[2:]], axis=0))
+    before, here, after = padded[:-2], padded[1:-1], padded[2:]
+    lower, upper = np.minimum(before, here), np.maximum(before, here)
+    return np.maximum(lower, np.minimum(upper, after))
 
 
 def median_slope(x: Floats, y: Floats) -> float:

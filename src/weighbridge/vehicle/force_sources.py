@@ -7,11 +7,10 @@ from dataclasses import replace
 from typing import Final
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
 
 from weighbridge.limits import MOVES, SOME
 from weighbridge.messages import Problem, phrase
-from weighbridge.signals import Drive, Floats, Signal
+from weighbridge.signals import Drive, Floats, Signal, moving_mean
 from weighbridge.vehicle.gear import spin_rate
 from weighbridge.vehicle.reported_torque import torque_in_nm, torque_in_percent
 from weighbridge.vehicle.torque_source import (
@@ -149,7 +148,7 @@ def battery_use(drive: Drive) -> BatteryUse:
     time, power = amps.time[known], power[known]
     v = _speed_of(drive).at(time)
     around = max(round(1.0 / amps.period), 1) if amps.period > 0.0 else 1
-    averaged = uniform_filter1d(np.nan_to_num(v), around) if time.size else v
+    averaged = moving_mean(np.nan_to_num(v), around, "symmetric")
     gained = np.gradient(averaged**2, time) if time.size > 1 else np.zeros(time.size)
     sign = math.copysign(1.0, float((power - np.mean(power)) @ gained)) if time.size else 1.0
     moves = time[np.abs(v) >= MOVES]

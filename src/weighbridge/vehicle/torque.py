@@ -7,10 +7,9 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
 
 from weighbridge.messages import Problem, refused
-from weighbridge.signals import Bools, Drive, Floats, Signal
+from weighbridge.signals import Bools, Drive, Floats, Signal, moving_mean
 from weighbridge.vehicle.air import Air
 from weighbridge.vehicle.force_sources import battery_use
 from weighbridge.vehicle.model import TorqueModel, Vehicle
@@ -216,8 +215,8 @@ def averaged(
         return _averaged_until(values, time, period, span, ahead)
     size = 2 * round(0.5 * span / period) + 1
     known = np.isfinite(values)
-    share = uniform_filter1d(known.astype(np.float64), size)
-    mean = uniform_filter1d(np.where(known, values, 0.0), size)
+    share = moving_mean(known.astype(np.float64), size, "symmetric")
+    mean = moving_mean(np.where(known, values, 0.0), size, "symmetric")
     return np.where(share > 0.5 / size, mean / np.maximum(share, 0.5 / size), np.nan)
 
 

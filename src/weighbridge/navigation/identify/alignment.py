@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
 
 from weighbridge.constants import GRAVITY
 from weighbridge.kernels.rotation import euler_to_matrix
@@ -22,7 +21,7 @@ from weighbridge.navigation.identify.mounting import (
 )
 from weighbridge.navigation.identify.timing import estimate_speed_delay
 from weighbridge.navigation.sources import undelayed, usable
-from weighbridge.signals import Drive, Floats, Signal
+from weighbridge.signals import Drive, Floats, Signal, moving_mean
 from weighbridge.vehicle import Mounting
 
 COARSE_PERIOD: Final = 0.5
@@ -146,11 +145,8 @@ def _nod(imu: Even, coarse: CoarseMounting, speed: Signal) -> float:
     accel = np.gradient(np.where(known, at, 0.0), imu.time)
     turned = np.cumsum(imu.values[:, 3:] @ coarse.rot_bs[1]) * COARSE_PERIOD
     short, long = (max(3, round(x / COARSE_PERIOD)) for x in _NOD_BAND)
-    x, y = (
-        uniform_filter1d(v, short, mode="nearest") - uniform_filter1d(v, long, mode="nearest")
-        for v in (accel, turned)
-    )
-    inner = uniform_filter1d(known.astype(np.float64), long, mode="constant") > 1.0 - 1e-9
+    x, y = (moving_mean(v, short, "edge") - moving_mean(v, long, "edge") for v in (accel, turned))
+    inner = moving_mean(known.astype(np.float64), long, "constant") > 1.0 - 1e-9
     spread = float(x[inner] @ x[inner])
     return float(x[inner] @ y[inner]) / spread if spread > 0.0 else 0.0
 

@@ -8,14 +8,13 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import uniform_filter1d
 
 from weighbridge.constants import GRAVITY, INDEPENDENT, SAMPLES_AT_ONCE
 from weighbridge.limits import FEWEST_BLOCKS, MOVES, SURE
 from weighbridge.navigation.axes import Axes
 from weighbridge.navigation.identify.steps import fitted
 from weighbridge.navigation.motion import Motion
-from weighbridge.signals import Floats, Signal, resolution, spread
+from weighbridge.signals import Floats, Signal, moving_mean, resolution, spread
 
 _STEP: Final = 0.25
 """Faster speeds are thinned to it [s]."""
@@ -257,11 +256,11 @@ def changes_of_speed(
     whole &= np.abs(stamps[ahead:] - stamps[:-ahead] - span) < 0.5
     whole &= (stamps[:-ahead] > motion.time[0]) & (stamps[ahead:] < motion.time[-1])
     width = max(3, round(_LEVEL / period))
-    share = uniform_filter1d(whole.astype(np.float64), width, mode="constant")
+    share = moving_mean(whole.astype(np.float64), width, "constant")
 
     def change(y: Floats) -> Floats:
         step = np.where(whole, y[ahead:] - y[:-ahead], 0.0)
-        mean = uniform_filter1d(step, width, mode="constant") / np.maximum(share, 1e-9)
+        mean = moving_mean(step, width, "constant") / np.maximum(share, 1e-9)
         return np.asarray(step - mean)
 
     by_force, by_speed = change(force), change(values)
