@@ -45,14 +45,9 @@ class SwitchState(NamedTuple):
     log_likelihood: float
 
 
-@kernel
 def initial_state(state, params):
     """Start from a `disturbance.DisturbanceState`, the force off or on as it is in the mean."""
-    n = state.x.size
-    x, cov = np.empty((2, n)), np.empty((2, n, n))
-    for i in range(2):
-        x[i] = state.x
-        cov[i] = state.cov
+    x, cov = np.stack((state.x, state.x)), np.stack((state.cov, state.cov))
     on = params.on_time / (params.on_time + params.off_time)
     share = np.array([1.0 - on, on])
     return SwitchState(x, cov, share, np.diag(share), state.time, state.rows, 0.0)

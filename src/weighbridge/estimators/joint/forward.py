@@ -220,7 +220,7 @@ def _first_switch(
     """Begin to find when accessories are on; None where none are switched."""
     if not setup.switched_power > 0.0:
         return None
-    return switched.initial_state(  # type: ignore[no-any-return]
+    return switched.initial_state(  # type: ignore[no-any-return,no-untyped-call]
         state, switch_params(params)
     )
 

@@ -112,7 +112,7 @@ def find_switched(
         start, noise, params = problem.kernel_input(*np.exp(level[:2]))
         how = switch_params(params)
         return switched.run(  # type: ignore[no-any-return]
-            switched.initial_state(start, how),
+            switched.initial_state(start, how),  # type: ignore[no-untyped-call]
             problem.time, problem.rows, problem.y, noise, power * column, added, how,
         )  # fmt: skip
 
