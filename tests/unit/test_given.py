@@ -1,5 +1,7 @@
 """Drives and vehicles given as objects, paths or data frames, and how they show themselves."""
 
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -26,6 +28,17 @@ def test_paths_are_read(saved):
     for of_paths in (str, Path):
         assert wb.weigh(of_paths(drive), of_paths(vehicle)).mass == by_hand.mass
         assert wb.inspect_drive(of_paths(drive), of_paths(vehicle)).drive.name == "drive"
+
+
+def test_only_its_own_reader_and_method_are_imported_for_a_drive(saved):
+    code = (
+        "import sys, weighbridge as wb\n"
+        f"print(wb.weigh({str(saved / 'drive')!r}, {str(saved / 'car.toml')!r}).status)\n"
+        "other = ('io.mdf', 'io.naming', 'io.bus', 'io.draft', 'estimators.rls')\n"
+        "print([name for name in other if f'weighbridge.{name}' in sys.modules])\n"
+    )
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert ran.stdout.splitlines() == ["converged", "[]"]
 
 
 def test_a_path_is_calibrated_on(saved):
