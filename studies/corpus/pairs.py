@@ -17,7 +17,7 @@ from fault_cases import pairs as pairs_of_faults
 from studies.corpus.subjects import MADE, MADE_BY_GEARBOX, READ, SHARED, Subject, absent, subject
 
 import weighbridge as wb
-from weighbridge.signals import Drive, Signal
+from weighbridge.signals import QUANTITIES, Drive, Signal
 from weighbridge.vehicle.air import standard_pressure
 from weighbridge.vehicle.model import Vehicle
 
@@ -148,6 +148,14 @@ def _cut(one: Subject, vehicle: Vehicle, *, drive: str, part: float, equipment: 
     recorded, true = one.drives[drive]
     begin = recorded.start + part * max(recorded.duration - CUT, 0.0)
     return Made(EQUIPMENT[equipment](recorded.between(begin, begin + CUT)), vehicle, true)
+
+
+def _cut_off_clock(one: Subject, vehicle: Vehicle, *, drive: str, part: float, late: float) -> Made:
+    """Set the clock of the bus wrong in a cut [s]."""
+    made = _cut(one, vehicle, drive=drive, part=part, equipment="full")
+    bus = [s for s in made.drive.signals.values() if QUANTITIES[s.name].table == "obd"]
+    moved = (replace(s, time=s.time + late) for s in bus)
+    return made._replace(drive=made.drive.with_signals(*moved))
 
 
 def _faulty(one: Subject, vehicle: Vehicle, *, case: Case) -> Made:
@@ -349,6 +357,19 @@ def _cuts() -> Iterator[Pair]:
                         f"{of}/{name} from {part:.0%}/{equipment}", f"cut of 300 s: {equipment}",
                         of, equipment, make, sound=True,
                     )  # fmt: skip
+
+
+def _off_clocks() -> Iterator[Pair]:
+    """Short drives in which the bus is seconds off the inertial sensor."""
+    for of in ("own car", "own van", "own electric", "second petrol", "second van", "second truck"):
+        name = "ordinary" if of.startswith("second") else "drive"
+        for late in (-3.0, -1.0, 3.0):
+            make = partial(_cut_off_clock, drive=name, part=0.3, late=late)
+            yield Pair(
+                f"{of}/{name} from 30%, bus {abs(late):g} s {'late' if late > 0.0 else 'early'}",
+                "cut of 300 s: bus seconds off", of, "full", make, sound=False,
+                reference=f"{of}/{name} from 30%/full",
+            )  # fmt: skip
 
 
 def _faults() -> Iterator[Pair]:
@@ -589,7 +610,8 @@ def _gearboxes() -> Iterator[Pair]:
 def all_pairs() -> list[Pair]:
     """List all pairs, in an order that stays."""
     return [
-        *_of_equipment(), *_cuts(), *_faults(), *_heights(), *_recordings(), *_strangers(),
+        *_of_equipment(), *_cuts(), *_off_clocks(), *_faults(), *_heights(), *_recordings(),
+        *_strangers(),
         *_misread_pairs(), *_in_feet(), *_other_sensors(), *_other_rates(),
         *_gearboxes(),
     ]  # fmt: skip

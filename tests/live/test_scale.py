@@ -26,7 +26,7 @@ from weighbridge.pipeline.forward import (
     step,
     with_open,
 )
-from weighbridge.signals import LONGEST_STEP, STEP, recent, step_ends
+from weighbridge.signals import LONGEST_STEP, QUANTITIES, STEP, recent, step_ends
 from weighbridge.simulation import MIDSIZE, Loading, Scenario, short_route, simulate_car
 
 
@@ -114,6 +114,36 @@ def test_other_steps_are_those_of_the_setup(brief, weighing, step):
     told = fed(scale, brief, even(brief, 3.0))
     assert told.std == forward.std[-1]
     assert told.mass == forward.state.mass - scale._state.force.fuel
+
+
+def test_a_bus_three_seconds_late_is_weighed_as_soon(short, car):
+    """The whole table is moved, in the stages as in what is looked at."""
+
+    def told(drive):
+        scale, first = wb.LiveScale(car, info=drive.info, step=LONGEST_STEP), np.inf
+        for block in blocks(drive, even(drive, 4.0)):
+            scale.update_block(block)
+            now = scale.weighing()
+            assert now.status is not LiveStatus.INCONSISTENT
+            if np.isfinite(now.mass):
+                first = min(first, now.driven)
+        before = now.mass
+        scale.finish()
+        return first, before, scale.weighing()
+
+    late = short.with_signals(
+        *(
+            replace(s, time=s.time + 3.0)
+            for s in short.signals.values()
+            if QUANTITIES[s.name].table == "obd"
+        )
+    )
+    first, before, end = told(short)
+    first_late, before_late, end_late = told(late)
+    assert first_late <= first + 30.0
+    assert end_late.mass == pytest.approx(end.mass, abs=end.std)
+    assert before_late == pytest.approx(before, abs=end.std)
+    assert any(p.id == "clock.moved" for p in end_late.problems)
 
 
 def test_a_step_that_rounds_is_refused(car):
@@ -530,7 +560,7 @@ def test_a_look_soon_after_a_stop_leaves_the_other_load_on_trial(car, delivered)
     weighing = wb.weigh(soon, car)
     assert not weighing.load_changed
     setup = identify_forward(weighing, LONGEST_STEP)
-    state = resume(weighing, soon, soon.end, setup)
+    state = resume(weighing, soon.end, setup)
     assert state.joint.load.open
     new = made.scenario.mass + 400.0
     assert abs(state.joint.mass - new) < 4.0 * state.joint.std(setup.joint)

@@ -110,6 +110,35 @@ def test_clocks_that_part_are_brought_together(made, car, mass, tables, change):
     assert any(p.id in ("clock.moved", "torque.clock_moved") for p in told.problems)
 
 
+@pytest.mark.parametrize("late", [-3.0, -1.8, 1.0, 2.0])
+def test_a_table_seconds_off_is_moved_however_short_the_drive(made, car, late):
+    short = made.drive.between(300.0, 520.0)
+    told = wb.weigh(retimed(short, {"imu"}, lambda t: t + late), car)
+    assert told.mass == pytest.approx(wb.weigh(short, car).mass, rel=0.01)
+    assert [p.id for p in told.problems].count("clock.moved") == 1
+
+
+@pytest.mark.parametrize(
+    ("tables", "change"),
+    [
+        ({"obd"}, lambda t: t + 18.0),
+        ({"obd"}, lambda t: t + 2.0 * (t > 700.0)),
+        ({"obd"}, lambda t: t * (1.0 + 2e-3)),
+        ({"imu"}, lambda t: t * 0.99),
+    ],
+    ids=["18s", "step", "obd+2000ppm", "imu-1%"],
+)
+def test_a_drive_says_how_its_last_stamps_were_moved(made, tables, change):
+    drive = retimed(made.drive, tables, change)
+    moved = correct_drive(drive)
+    (shift,) = moved.shifts.values()
+    for name in ("vehicle_speed", "accel_x"):
+        if QUANTITIES[name].table in moved.shifts:
+            late = drive.signals[name].time[-50:]
+            assert shift.onto(late) == pytest.approx(moved.signals[name].time[-50:], abs=1e-6)
+    assert not correct_drive(made.drive).shifts
+
+
 def test_an_inertial_clock_of_its_own_is_the_one_that_is_moved(made):
     mended = correct_drive(retimed(made.drive, {"imu"}, lambda t: t * (1.0 + 1e-3)))
     assert mended.signals["vehicle_speed"].time is made.drive.signals["vehicle_speed"].time

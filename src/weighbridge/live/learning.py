@@ -116,7 +116,7 @@ def learn(drive: Drive, vehicle: Vehicle, until: float, step: float) -> Learned:
             problems=weighing.problems,
             std_found=_std_found(weighing),
         )
-    setup, state = (None, None) if early is not None else _set_up(weighing, drive, until, step)
+    setup, state = (None, None) if early is not None else _set_up(weighing, until, step)
     return Learned(
         until=until,
         since=weighing.segments[-1].start if weighing.load_changed else drive.start,
@@ -141,18 +141,17 @@ def _early(drive: Drive, vehicle: Vehicle) -> Weighing:
 
 
 def _set_up(
-    weighing: Weighing, drive: Drive, until: float, step: float
+    weighing: Weighing, until: float, step: float
 ) -> tuple[ForwardSetup | None, ForwardState | None]:
-    """Set up the stages; all records so far are one step of theirs.
+    """Set up the stages; all records so far, as they were corrected, are one step of theirs.
 
-    The records are as they came: what the checks of the weighing left out or moved is in them.
     Without an inertial sensor, or where it was left out, there are no stages.
     """
     try:
         setup = forward.identify_forward(weighing, step)
     except DriveError:
         return None, None
-    return setup, forward.resume(weighing, drive, until, setup)
+    return setup, forward.resume(weighing, until, setup)
 
 
 def _floor(weighing: Weighing) -> float:

@@ -194,7 +194,7 @@ class LiveScale:
             "step": self._every,
             "info": self.info,
             "learned": None if self._learned is None else self._learned.answer(),
-            "samples": self._records.last(BEHIND + 2.0 * self._every, FEWEST_SAMPLES),
+            "samples": self._records.last(self._behind + 2.0 * self._every, FEWEST_SAMPLES),
         }
         return packed(content, self.vehicle)
 
@@ -400,8 +400,13 @@ class LiveScale:
         state, setup, records = self._state, self._setup, self._records
         if state is None or setup is None or not state.joint.windows:
             return state
-        seen = records.so_far("live", self.info, BEHIND + self._every, FEWEST_SAMPLES)
+        seen = records.so_far("live", self.info, self._behind + self._every, FEWEST_SAMPLES)
         return forward.looked_ahead(state, seen, records.newest, setup)
+
+    @property
+    def _behind(self) -> float:
+        """Time before a step in which it reads the records, too [s]."""
+        return BEHIND + (0.0 if self._setup is None else self._setup.reach)
 
     def _goes_on(self) -> bool:
         """Whether the mass is that of the forward stages, which each second of driving makes."""
@@ -486,7 +491,7 @@ class LiveScale:
                 self._state = forward.begin(self._setup, oldest)
         while self._next <= end:
             self._records.seal(self._next)
-            if self._records.newest_sealed >= self._next - self._every - BEHIND:
+            if self._records.newest_sealed >= self._next - self._every - self._behind:
                 self._step(self._next, self._every)
                 self._next += self._every
             else:
@@ -495,7 +500,7 @@ class LiveScale:
 
     def _step(self, until: float, length: float) -> None:
         drive = self._records.drive("live", self.info)
-        seen = recent(drive, until, length)
+        seen = recent(drive, until, length + self._behind - BEHIND)
         moved = moves(seen, until)
         still = stands(seen, until)
         if not still and self._kerb.stand is not None:
@@ -512,7 +517,7 @@ class LiveScale:
         self._tilt(seen, until, length, still=still)
         if self._looking is not None:
             self._looking.steps.append(Step(until, seen, length if moved else 0.0))
-        keep = BEHIND + 2.0 * self._every
+        keep = self._behind + 2.0 * self._every
         if self._learns:
             keep += LONGEST
             if self._move.is_due:

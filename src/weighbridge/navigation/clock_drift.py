@@ -23,6 +23,7 @@ from weighbridge.navigation.frozen import without_frozen
 from weighbridge.signals import (
     QUANTITIES,
     Bools,
+    ClockShift,
     Drive,
     Floats,
     Problem,
@@ -59,9 +60,10 @@ _NEAR: Final = 0.25
 # A quarter of a piece [s]: the error of its lag per drift.
 _BLUR: Final = 45.0
 # A sensor's own lateness: speeds are late by this where nothing else is known, and by no more or
-# less than that where their clock is right [s].
+# less than that where their clock is right [s]. Beyond, the torque of the same table is as far off,
+# and no delay of a calibration.
 _USUAL: Final = 0.1
-_OWN: Final = (-1.0, 2.0)
+_OWN: Final = (-0.5, 1.5)
 # Of a clock that was right when the recording began [s].
 _BEGUN: Final = (-0.3, 0.8)
 # Two tables that drift alike against the third: it is the third whose clock is wrong [s].
@@ -183,8 +185,10 @@ def _lags(force: Integrated, speed: Signal) -> Lags:
 
 def _judged(lags: Lags, table: str) -> _Path | Problem | None:
     """Say how a table is to be moved, that it cannot be, or None where its clock is sound."""
-    if lags.lag.size < FEWEST_PIECES:
+    if not lags.lag.size:
         return None
+    if lags.lag.size < FEWEST_PIECES:
+        return _constant(lags)
     time, lag = lags.time, lags.lag
     # By second differences, so that neither drift nor step counts as scatter.
     scatter = max(spread(np.diff(lag, 2)) / np.sqrt(6.0), float(np.median(lags.std)))
@@ -208,6 +212,15 @@ def _judged(lags: Lags, table: str) -> _Path | Problem | None:
         text = phrase("clock_drifts", slope=1e6 * slope) if drifts else ""
         return _Path(knots, float(np.mean(fit)) + slope * (knots - time.mean()), slope, (), text)
     return _broken(time, lag, table)
+
+
+def _constant(lags: Lags) -> _Path | None:
+    """Lag of a short drive, where its pieces show one alike and no sensor is so late itself."""
+    middle = float(np.average(lags.lag, weights=1.0 / lags.std**2))
+    apart = np.ptp(lags.lag) > _WANDER or lags.lag.size < _SHOWN * lags.pieces
+    if apart or _OWN[0] < middle < _OWN[1]:
+        return None
+    return _Path(lags.time, np.full(lags.time.size, middle), 0.0, (), "")
 
 
 def _broken(time: Floats, lag: Floats, table: str) -> _Path | Problem | None:
@@ -278,7 +291,7 @@ def _table_moved(drive: Drive, table: str, path: _Path) -> Drive:
     """Move the signals of a table onto the inertial clock; leave out rows about a step."""
     level = _level(path)
     return _moved(
-        drive, table, lambda t: t - path.at(t) + level, path.cuts
+        drive, table, lambda t: t - path.at(t) + level, path.cuts, -path.slope
     ).with_problems(_note(table, "imu", path, level))  # fmt: skip
 
 
@@ -289,7 +302,8 @@ def _imu_moved(drive: Drive, path: _Path) -> Drive:
     reach = max(ends) - min(ends)
     knots = np.concatenate((path.time[:1] - reach, path.time, path.time[-1:] + reach))
     own = knots - path.at(knots) + level
-    return _moved(drive, "imu", lambda t: np.interp(t, own, knots), ()).with_problems(
+    drift = path.slope / (1.0 - path.slope)
+    return _moved(drive, "imu", lambda t: np.interp(t, own, knots), (), drift).with_problems(
         _note("obd and gnss", "imu", path, level)
     )
 
@@ -303,10 +317,18 @@ def _moved(
     table: str,
     onto: Callable[[Floats], Floats],
     cuts: tuple[tuple[float, float], ...],
+    drift: float,
 ) -> Drive:
-    """Give the signals of a table other stamps; those that share a clock go on sharing one."""
+    """Give the signals of a table other stamps; those that share a clock go on sharing one.
+
+    The last ones are moved by ``drift`` more for each second [-].
+    """
     clocks: dict[int, tuple[Floats, Bools | None]] = {}
     signals = dict(drive.signals)
+    end = max(float(s.time[-1]) for n, s in drive.signals.items() if _of(n, table) and len(s))
+    shift = ClockShift(end, float(onto(np.array([end]))[0]) - end, drift)
+    before = drive.shifts.get(table)
+    shifts = {**drive.shifts, table: shift if before is None else before.then(shift)}
     for name, s in drive.signals.items():
         if not _of(name, table):
             continue
@@ -317,7 +339,7 @@ def _moved(
             clocks[id(s.time)] = (onto(s.time[keep]), None if keep.all() else keep)
         time, kept = clocks[id(s.time)]
         signals[name] = Signal(name, time, s.values if kept is None else s.values[kept])
-    return replace(drive, signals=signals)
+    return replace(drive, signals=signals, shifts=shifts)
 
 
 def _note(table: str, other: str, path: _Path, level: float) -> Problem:

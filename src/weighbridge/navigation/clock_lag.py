@@ -25,9 +25,10 @@ eight hours)."""
 _SPAN: Final = 2.0
 # Means over so long are taken off: grade and bias [s].
 _LEVEL: Final = 20.0
-# Pieces of a drive, and how far they lie apart [s].
+# Pieces of a drive, and how far they lie apart [s]; a shorter drive is one, down to the last.
 _PIECE: Final = 180.0
 _HOP: Final = 90.0
+_SHORTEST: Final = 60.0
 # A step is found to within so long: means over `_LEVEL` hold both of its sides [s].
 _ABOUT: Final = 15.0
 # Stamps so close are enough for the integrals [s].
@@ -123,8 +124,8 @@ def find_lags(force: Integrated, speed: Signal, *, centre: float = 0.0) -> Lags:
     """
     start, end = float(speed.time[0]), float(speed.time[-1])
     count = int((end - start) / STEP)
-    hop, size = (round(x / STEP) for x in (_HOP, _PIECE))
-    if count < size or force.samples < 50:
+    hop, size = round(_HOP / STEP), min(round(_PIECE / STEP), count)
+    if size < round(_SHORTEST / STEP) or force.samples < 50:
         return Lags(*(np.empty(0) for _ in range(4)))
     grid: Floats = np.asarray(start + STEP * np.arange(count), dtype=np.float64)
     shown, seen = _speed_changes(speed, grid)
@@ -157,13 +158,13 @@ def find_lags(force: Integrated, speed: Signal, *, centre: float = 0.0) -> Lags:
                 peak = _peak(*reported, size)
                 if peak is not None:
                     found[first] = peak
-    at = sorted(found)
+    at, middle = sorted(found), 0.5 * STEP * size
     return Lags(
-        grid[at] + 0.5 * _PIECE,
+        grid[at] + middle,
         # Force later in the row is force at a smaller lag.
         centre - np.array([found[k][0] for k in at]),
         np.array([found[k][1] for k in at]),
-        grid[[k for k in lively if k not in found]] + 0.5 * _PIECE,
+        grid[[k for k in lively if k not in found]] + middle,
     )
 
 
@@ -178,7 +179,7 @@ def find_offset(force: Integrated, speed: Signal) -> float | None:
 
     first, last = force.start, force.end
     start, end = float(speed.time[0]), float(speed.time[-1])
-    if min(last - first, end - start) < _PIECE:
+    if min(last - first, end - start) < _SHORTEST:
         return None
     x, seen = _speed_changes(speed, np.arange(start, end, STEP))
     x = _high_passed(x, seen)

@@ -9,7 +9,9 @@ way gets the same numbers to the last bit.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
@@ -36,7 +38,16 @@ from weighbridge.kernels import window_means
 from weighbridge.kernels.ins_model import E_SQUAT, SQUAT
 from weighbridge.navigation import forward
 from weighbridge.navigation.select import scaled_for_navigation
-from weighbridge.signals import STEP, STEPS, Drive, Floats, recent, step_ends
+from weighbridge.signals import (
+    STEP,
+    STEPS,
+    ClockShift,
+    Drive,
+    Floats,
+    recent,
+    shifted,
+    step_ends,
+)
 from weighbridge.vehicle import Vehicle
 from weighbridge.vehicle.torque import reading_battery
 
@@ -65,6 +76,7 @@ class ForwardSetup:
     delay : lateness of the torque [s]
     period : between its readings [s]
     step : in which the records are taken [s], one of `weighbridge.signals.recent.STEPS`
+    shifts : which bring the records of a table onto the clock of the others, by table
 
     Raises
     ------
@@ -79,9 +91,19 @@ class ForwardSetup:
     delay: float
     period: float
     step: float = STEP
+    shifts: Mapping[str, ClockShift] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         check_step(self.step)
+
+    @property
+    def reach(self) -> float:
+        """Time by which the records of one table lie off those of the others, in whole seconds."""
+        return float(math.ceil(max((abs(s.by) for s in self.shifts.values()), default=0.0)))
+
+    def complete(self, until: float) -> float:
+        """Instant up to which records are complete where those as they come are until one [s]."""
+        return min([until, *(float(s.onto(np.asarray(until))) for s in self.shifts.values())])
 
 
 def check_step(step: float) -> None:
@@ -157,6 +179,7 @@ def identify_forward(weighing: Weighing, step: float = STEP) -> ForwardSetup:
         delay=result.balance.delay,
         period=float(np.median(np.diff(time))),
         step=step,
+        shifts=drive.shifts,
     )
 
 
@@ -225,7 +248,7 @@ def unloaded(state: ForwardState) -> ForwardState:
     return state._replace(joint=JointState())
 
 
-def resume(weighing: Weighing, records: Drive, until: float, setup: ForwardSetup) -> ForwardState:
+def resume(weighing: Weighing, until: float, setup: ForwardSetup) -> ForwardState:
     """Return the state after a drive that was weighed as a whole, to go on from.
 
     Motion and open window are those of the stages, the mass that of the weighing.
@@ -233,11 +256,11 @@ def resume(weighing: Weighing, records: Drive, until: float, setup: ForwardSetup
     Parameters
     ----------
     weighing : of the records
-    records : as they came, up to ``until``
     until : instant up to which they are complete [s]
     setup : of `identify_forward`, from the weighing
     """
-    state, _ = step(begin(setup, records.start), records, until, setup)
+    drive = weighing.drive
+    state, _ = _stepped(begin(setup, drive.start), drive, setup.complete(until), setup)
     load, result = state.joint.load, weighing.result
     if load is None or result is None or result.filter_input is None:
         return state
@@ -272,7 +295,7 @@ def lateness(setup: ForwardSetup) -> float:
     """Time that a row waits for what shows it [s]: delays, and look-ahead of the stages."""
     by_motion = forward.lateness(setup.navigation) + setup.force.ahead
     late = max(setup.delay, setup.force.engine_delay)
-    return max(by_motion, late + setup.force.readings_ahead)
+    return max(by_motion, late + setup.force.readings_ahead) - setup.complete(0.0)
 
 
 def step(
@@ -283,7 +306,8 @@ def step(
     Parameters
     ----------
     state : before it
-    records : those of `weighbridge.signals.recent.recent`, up to ``until``
+    records : those of `weighbridge.signals.recent.recent`, up to ``until``, as they came; with
+        `ForwardSetup.reach` more of them
     until : instant up to which records are complete [s]
     setup : of `identify_forward`
 
@@ -292,6 +316,13 @@ def step(
     state : after it
     running : mass after each window that became complete
     """
+    return _stepped(state, shifted(records, setup.shifts), setup.complete(until), setup)
+
+
+def _stepped(
+    state: ForwardState, records: Drive, until: float, setup: ForwardSetup
+) -> tuple[ForwardState, Running]:
+    """Weigh as `step` does, by records on one clock."""
     vehicle = setup.vehicle
     positions = setup.navigation.origin is not None
     seen = scaled_for_navigation(records, vehicle, positions=positions)
@@ -394,7 +425,7 @@ def forward_weigh(drive: Drive, setup: ForwardSetup) -> ForwardTrack:
     """
     state, parts = begin(setup, drive.start), [NO_WINDOWS]
     for until in step_ends(drive, setup.step):
-        state, running = step(state, recent(drive, until, setup.step), until, setup)
+        state, running = _stepped(state, recent(drive, until, setup.step), until, setup)
         parts.append(running)
     time, mass, std = (np.concatenate(rows) for rows in zip(*parts, strict=True))
     return ForwardTrack(time, mass, std, state.joint)

@@ -4,7 +4,7 @@ from weighbridge.messages import Problem
 from weighbridge.signals.alignment import Alignment, align
 from weighbridge.signals.catalogue import QUANTITIES, Quantity
 from weighbridge.signals.cleaning import NO_DRIVE, clean_columns, clean_signal, spread_rows
-from weighbridge.signals.drive import Drive, DriveInfo
+from weighbridge.signals.drive import ClockShift, Drive, DriveInfo
 from weighbridge.signals.lag import (
     best_lag,
     find_lag,
@@ -15,7 +15,15 @@ from weighbridge.signals.lag import (
 )
 from weighbridge.signals.moving import moving_mean
 from weighbridge.signals.parts import find_restarts, find_splices, numbered, parted
-from weighbridge.signals.recent import BEHIND, LONGEST_STEP, STEP, STEPS, recent, step_ends
+from weighbridge.signals.recent import (
+    BEHIND,
+    LONGEST_STEP,
+    STEP,
+    STEPS,
+    recent,
+    shifted,
+    step_ends,
+)
 from weighbridge.signals.robust import (
     huber,
     median_of_three,
@@ -46,6 +54,7 @@ __all__ = [
     "UNITS",
     "Alignment",
     "Bools",
+    "ClockShift",
     "Drive",
     "DriveInfo",
     "Floats",
@@ -78,6 +87,7 @@ __all__ = [
     "robust_fits",
     "scalar_from_si",
     "scalar_to_si",
+    "shifted",
     "spread",
     "spread_rows",
     "step_ends",

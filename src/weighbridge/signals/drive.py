@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime, timedelta
-from typing import Final
+from typing import Final, NamedTuple
+
+import numpy as np
 
 from weighbridge.arguments import (
     check_all,
@@ -16,7 +18,7 @@ from weighbridge.arguments import (
 )
 from weighbridge.messages import Problem
 from weighbridge.signals.shown import at_rate, in_html, in_lines, plural
-from weighbridge.signals.signal import Signal
+from weighbridge.signals.signal import Floats, Signal
 
 _NUMBERS: Final = (
     "mass",
@@ -63,6 +65,31 @@ class DriveInfo:
         check_texts("trusted", self.trusted)
 
 
+class ClockShift(NamedTuple):
+    """How the stamps of a table are brought onto the clock of the others.
+
+    Attributes
+    ----------
+    at : a stamp [s]
+    by : what is added to it [s]
+    drift : what is added more for each second after it [-]
+    """
+
+    at: float
+    by: float
+    drift: float = 0.0
+
+    def onto(self, time: Floats) -> Floats:
+        """Move stamps (n,) [s]."""
+        return np.asarray(time + (self.by + self.drift * (time - self.at)))
+
+    def then(self, other: ClockShift) -> ClockShift:
+        """Return one shift for this one and another of the moved stamps."""
+        moved = self.at + self.by
+        by = self.by + other.by + other.drift * (moved - other.at)
+        return ClockShift(self.at, by, self.drift + other.drift + self.drift * other.drift)
+
+
 @dataclass(frozen=True, slots=True, repr=False)
 class Drive:
     """One recording of one vehicle: signals, each on its own clock.
@@ -75,6 +102,7 @@ class Drive:
     problems : what was corrected or is questionable in the data
     contents : what raw bus logs hold, decoded or not, in sentences
     units : suffixes of the units that its file or mapping declares, by signal, where they are known
+    shifts : by which the last stamps of a table were moved, by table, where they were
     """
 
     name: str
@@ -83,6 +111,7 @@ class Drive:
     problems: tuple[Problem, ...] = ()
     contents: tuple[str, ...] = ()
     units: Mapping[str, str] = field(default_factory=dict, compare=False)
+    shifts: Mapping[str, ClockShift] = field(default_factory=dict, compare=False)
 
     def __post_init__(self) -> None:
         check_text("name of a drive", self.name)
@@ -92,6 +121,7 @@ class Drive:
         check_all("problems", self.problems, Problem, "weighbridge.Problem")
         check_texts("contents", self.contents)
         check_type("units", self.units, Mapping, "a dictionary of units by name")
+        check_type("shifts", self.shifts, Mapping, "a dictionary of ClockShift by table")
 
     def get(self, name: str) -> Signal | None:
         """Return the signal, or None where the drive lacks it."""

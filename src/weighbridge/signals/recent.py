@@ -9,7 +9,8 @@ from typing import Final
 
 import numpy as np
 
-from weighbridge.signals.drive import Drive
+from weighbridge.signals.catalogue import QUANTITIES
+from weighbridge.signals.drive import ClockShift, Drive
 from weighbridge.signals.signal import Floats, Signal
 
 STEPS: Final = (0.25, 0.5, 1.0, 2.0, 4.0)
@@ -39,6 +40,25 @@ def recent(drive: Drive, until: float, step: float = STEP) -> Drive:
         if last > first:
             cut[name] = Signal(name, s.time[first:last], s.values[first:last])
     return replace(drive, signals=cut)
+
+
+def shifted(drive: Drive, shifts: Mapping[str, ClockShift]) -> Drive:
+    """Bring tables onto the clock of the others; signals that share stamps go on sharing them.
+
+    Parameters
+    ----------
+    drive : or the last seconds of one
+    shifts : by table
+    """
+    clocks: dict[int, Floats] = {}
+    moved = []
+    for name, s in drive.signals.items():
+        shift = shifts.get(QUANTITIES[name].table)
+        if shift is not None:
+            time = clocks.get(id(s.time))
+            clocks[id(s.time)] = time = shift.onto(s.time) if time is None else time
+            moved.append(Signal(name, time, s.values))
+    return drive.with_signals(*moved) if moved else drive
 
 
 def looking(drive: Drive, ahead: float, periods: Mapping[str, float]) -> Drive:
