@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
+from tests.noted import refused
 
 import weighbridge as wb
 from weighbridge.balance import force_balance
@@ -150,13 +151,12 @@ def test_an_inertial_clock_of_its_own_is_the_one_that_is_moved(made):
     assert np.abs(moved).max() < 0.15
 
 
-def test_beside_a_clock_that_jumps_about_the_inertial_sensor_is_left_out(made, car, mass):
+def test_a_bus_whose_clock_jumps_about_gives_no_mass(made, car):
     """Set by several seconds every two minutes, as by a network in bad order."""
     jumps = np.random.default_rng(4).uniform(-4.0, 4.0, 100)
     drive = retimed(made.drive, {"obd"}, lambda t: np.sort(t + jumps[(t // 120.0).astype(int)]))
-    told = wb.weigh(drive, car)
-    assert any(p.id == "imu.left_out" for p in told.problems)
-    assert told.mass == pytest.approx(mass, abs=2.0 * told.std)
+    with refused("clock.torque_apart"):
+        wb.weigh(drive, car)
 
 
 def test_rows_about_a_step_are_left_out(made):

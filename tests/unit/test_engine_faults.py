@@ -215,6 +215,51 @@ def test_a_torque_through_a_filter_of_seconds_is_found(fleet):
     assert fleet.weigh_alone("car", slow).reason_id == "torque.smoothed"
 
 
+@pytest.fixture(scope="module", params=["car", "truck", "electric"])
+def once_a_second(fleet, request):
+    """One drive without an inertial sensor, its bus once a second, and a file from such a one."""
+    kind = request.param
+
+    def thinned(drive):
+        # The air flow would show it by itself.
+        beside = ("accel_", "gyro_", "mass_air_flow")
+        bus = drive.without(*(n for n in drive.signals if n.startswith(beside)))
+        wanted = np.arange(bus.start + 1.0, bus.end - 1.0)
+        kept = []
+        for s in bus.signals.values():
+            at = np.searchsorted(s.time, wanted, side="right") - 1
+            at = np.unique(at[at >= 0])
+            kept.append(Signal(s.name, s.time[at], s.values[at]))
+        return bus.with_signals(*kept)
+
+    known = fleet.simulated(MADE_BY[kind], 900, 1500.0)
+    bare = Vehicle(
+        kind=known.scenario.car.kind,
+        driveline=Driveline(wheel_radius=known.scenario.car.wheel_radius),
+    )
+    mass = float(known.truth.mass[0])
+    file = wb.calibrate([thinned(known.drive)], mass=mass, vehicle=bare)
+    return kind, thinned(fleet.drive(kind)), file
+
+
+@pytest.mark.parametrize("span", [2.0, 4.0])
+def test_a_torque_once_a_second_that_is_smoothed_gives_no_mass(fleet, once_a_second, span):
+    kind, drive, vehicle = once_a_second
+    found = wb.weigh(drive, vehicle)
+    assert abs(found.mass / fleet.mass(kind) - 1.0) < max(0.05, 3.0 * found.std / found.mass)
+
+    def filtered(t, x):
+        share = 1.0 - np.exp(-1.0 / span)
+        return lfilter([share], [1.0, share - 1.0], x, zi=[(1.0 - share) * x[0]])[0]
+
+    slow = with_signal(drive, SOURCE[kind], as_sent(kind, filtered))
+    try:
+        reason = wb.weigh(slow, vehicle).reason_id
+    except wb.DriveError as error:
+        reason = error.problem.id
+    assert reason in ("torque.slower", "clock.torque_apart")
+
+
 def test_a_noisy_accelerometer_is_not_taken_for_a_smoothed_torque(fleet):
     rng = np.random.default_rng(5)
     drive = with_signal(
