@@ -110,7 +110,6 @@ def run(name: str, folder: Path, car: wb.Vehicle) -> Run:
     try:
         batch = wb.weigh(drive, car)
         found = batch.segments[-1].mass if batch.load_changed else batch.mass
-        found -= float(batch.result.balance.table.fuel_burnt[-1]) if batch.result else 0.0
     except WeighbridgeError as error:
         print(f"{name}: {error}", file=sys.stderr)
         found = math.nan
