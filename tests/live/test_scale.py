@@ -116,7 +116,7 @@ def test_other_steps_are_those_of_the_setup(brief, weighing, step):
     assert told.mass == forward.state.mass - scale._state.force.fuel
 
 
-def test_a_bus_three_seconds_late_is_weighed_as_soon(short, car):
+def test_a_bus_three_seconds_late_is_weighed_soon(short, car):
     """The whole table is moved, in the stages as in what is looked at."""
 
     def told(drive):
@@ -140,7 +140,8 @@ def test_a_bus_three_seconds_late_is_weighed_as_soon(short, car):
     )
     first, before, end = told(short)
     first_late, before_late, end_late = told(late)
-    assert first_late <= first + 30.0
+    # A look or two later: the clock takes 90 s of records.
+    assert first_late <= first + 35.0
     assert end_late.mass == pytest.approx(end.mass, abs=end.std)
     assert before_late == pytest.approx(before, abs=end.std)
     assert any(p.id == "clock.moved" for p in end_late.problems)

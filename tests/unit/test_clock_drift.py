@@ -112,11 +112,17 @@ def test_clocks_that_part_are_brought_together(made, car, mass, tables, change):
 
 
 @pytest.mark.parametrize("late", [-3.0, -1.8, 1.0, 2.0])
-def test_a_table_seconds_off_is_moved_however_short_the_drive(made, car, late):
+def test_a_table_seconds_off_is_moved_in_a_drive_of_minutes(made, car, late):
     short = made.drive.between(300.0, 520.0)
     told = wb.weigh(retimed(short, {"imu"}, lambda t: t + late), car)
     assert told.mass == pytest.approx(wb.weigh(short, car).mass, rel=0.01)
     assert [p.id for p in told.problems].count("clock.moved") == 1
+
+
+@pytest.mark.parametrize("start", np.arange(100.0, LENGTH - 130.0, 130.0))
+def test_no_table_of_a_short_drive_is_moved_whose_clock_is_right(made, start):
+    for length in (60.0, 95.0, 125.0):
+        assert not correct_drive(made.drive.between(start, start + length)).shifts
 
 
 @pytest.mark.parametrize(
