@@ -24,6 +24,8 @@ from accuracy_drives import (
     scenario,
     shared_out,
 )
+from fault_kinds.inertial import pitch_creeps
+from scipy.special import ndtr
 
 from weighbridge.errors import DriveError
 from weighbridge.estimators.joint import batch
@@ -694,6 +696,152 @@ def tell_start(done: Rows) -> str:
     return "\n".join(lines)
 
 
+# What changes between calibration and drive: the road, the tyres, the mounting.
+
+CONDITIONS: Final = ("ordinary", "first five minutes", "wet road", "larger tyres", "creeping mount")
+WET: Final = 1.25
+"""Rolling resistance on a wet road over that on a dry one [-]."""
+
+LARGER: Final = 1.012
+"""Rolling radius of other tyres over that of the calibration [-]."""
+
+CREEP: Final = 1.0
+"""Pitch by which a phone holder gives way over a drive [deg]."""
+
+FIRST_MINUTES: Final = 300.0
+"""On the move [s]."""
+
+LIMITS: Final = np.linspace(-0.04, 0.04, 9)
+"""Permitted masses that are asked about, over the true mass less one [-]."""
+
+
+@dataclass(frozen=True)
+class InCondition:
+    """One drive in one condition, weighed; error and std relative to the mass, NaN without one."""
+
+    kind: str
+    number: int
+    condition: str
+    mass: float
+    error: float
+    std: float
+
+    @property
+    def holds(self) -> bool:
+        return abs(self.error) <= 1.96 * self.std
+
+
+def in_condition(made: Scenario, condition: str) -> SimulatedDrive:
+    """Drive the same way under another condition."""
+    car, polling = made.car, made.polling
+    if condition == "wet road":
+        made = replace(made, car=replace(car, rolling_coefficient=WET * car.rolling_coefficient))
+    if condition == "larger tyres":
+        # The control unit does not know of them.
+        polling = replace(polling, speed_scale=polling.speed_scale / LARGER)
+        made = replace(
+            made, car=replace(car, wheel_radius=LARGER * car.wheel_radius), polling=polling
+        )
+    return simulate_car(made)
+
+
+def seen_in(made: SimulatedDrive, condition: str) -> Drive:
+    """Return what is weighed of a drive."""
+    drive = without_weather(made.drive)
+    if condition == "first five minutes":
+        moving = np.cumsum((made.truth.speed > 0.5) * np.gradient(made.truth.time))
+        end = made.truth.time[np.searchsorted(moving, FIRST_MINUTES)]
+        return drive.between(drive.start, float(end))
+    if condition == "creeping mount":
+        return pitch_creeps(drive, CREEP, np.random.default_rng(0))
+    return drive
+
+
+def condition_job(number: int, vehicle: Vehicle) -> list[InCondition]:
+    """Weigh three loads of a vehicle in each condition."""
+    kind, car, rng, seed = fleet(number, 6)
+    found = []
+    for k, part in enumerate((0.0, 0.5, 0.95)):
+        drawn = mixed(car, rng, load=part * FULL[car.kind] * car.mass, seed=seed + 10 + k)
+        for condition in CONDITIONS:
+            made = in_condition(drawn, condition)
+            mass = float(made.truth.mass[0])
+            try:
+                w = weigh(seen_in(made, condition), vehicle)
+            except DriveError:
+                found.append(InCondition(kind, number, condition, mass, math.nan, math.nan))
+                continue
+            end = float(np.interp(w.drive.end, made.truth.time, made.truth.mass))
+            shown = w.status == "converged"
+            error = w.mass / end - 1.0
+            found.append(
+                InCondition(kind, number, condition, end, error if shown else math.nan, w.std / end)
+            )
+    return found
+
+
+def overload_figures(rows: Sequence[InCondition]) -> list[str]:
+    """Compare what is reported as the probability of an overload with how often it is one."""
+    reported, true = [], []
+    for row in rows:
+        if math.isfinite(row.error):
+            for limit in LIMITS:
+                reported.append(float(ndtr((row.error - limit) / row.std)))
+                true.append(limit < 0.0)
+    shares = np.array(reported)
+    lines = ["| probability reported | times | mean reported | overloaded |", "|---|---|---|---|"]
+    for low, high in ((0.9, 0.99), (0.5, 0.9), (0.1, 0.5), (0.01, 0.1)):
+        chosen = (shares >= low) & (shares < high)
+        so = np.array(true)[chosen]
+        lines.append(
+            f"| {low:.0%} to {high:.0%} | {chosen.sum()} | {shares[chosen].mean():.0%} "
+            f"| {so.mean():.0%} |"
+            if so.size
+            else f"| {low:.0%} to {high:.0%} | 0 | | |"
+        )
+    return lines
+
+
+def tell_conditions(done: Rows) -> str:
+    rows = [row for _, part in done for row in part]
+    usual = {(r.number, k): r.error for r, k in _numbered(rows, "ordinary")}
+    lines = [
+        "| condition | weighed | RMS % | mean % | 95th % | worst % "
+        "| mean beside the ordinary drive % | intervals that hold | (error / std)², mean |",
+        "|---" * 9 + "|",
+    ]
+    for condition in CONDITIONS:
+        chosen = [r for r in rows if r.condition == condition]
+        known = [r for r in chosen if math.isfinite(r.error)]
+        moved = [r.error - usual[r.number, k] for r, k in _numbered(rows, condition)]
+        scaled = np.array([r.error / r.std for r in known])
+        lines.append(
+            f"| {condition} | {len(known)} of {len(chosen)} {spread([r.error for r in known])}"
+            f"| {100.0 * np.nanmean(moved):+.2f} | {np.mean([r.holds for r in known]):.0%} "
+            f"| {np.mean(scaled**2):.2f} |"
+        )
+    gains: dict[str, list[str]] = {}
+    for number in dict.fromkeys(r.number for r in rows):
+        own = [
+            r for r in rows
+            if r.number == number and r.condition == "ordinary" and math.isfinite(r.error)
+        ]  # fmt: skip
+        true = np.array([r.mass for r in own])
+        slope = np.polyfit(true, true * (1.0 + np.array([r.error for r in own])), 1)[0]
+        gains.setdefault(own[0].kind, []).append(f"{slope:.3f}")
+    told = "; ".join(f"{kind} {', '.join(many)}" for kind, many in gains.items())
+    return "\n".join([*lines, "", f"Gain of load by vehicle: {told}.", "", *overload_figures(rows)])
+
+
+def _numbered(rows: Sequence[InCondition], condition: str) -> Iterator[tuple[InCondition, int]]:
+    """Rows of a condition, each with the number of its drive among those of its vehicle."""
+    count: dict[int, int] = {}
+    for row in rows:
+        if row.condition == condition:
+            yield row, count.setdefault(row.number, 0)
+            count[row.number] += 1
+
+
 @dataclass(frozen=True)
 class Part:
     """One claim: what is to be done, how, and how its figures are told.
@@ -719,6 +867,7 @@ PARTS: Final[dict[str, Part]] = {
     "data-sheet": Part(UNCALIBRATED, data_sheet_job, tell_data_sheet, filed=False),
     "cruise": Part(tuple(range(6)), cruise_job, tell_cruise),
     "start": Part(tuple(range(6)), start_job, tell_start),
+    "conditions": Part(tuple(range(12)), condition_job, tell_conditions),
 }
 
 
