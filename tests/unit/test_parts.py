@@ -127,6 +127,14 @@ def test_a_splice_on_one_clock_is_found(trips):
     assert [p.duration for p in parts] == pytest.approx([200.0] * 3, abs=1.5)
     assert not any(find_splices(p) for p in parts)
     assert not any(find_splices(t) for t in trips)
+    # As one drive it has no mass, unless a person vouches for what jumps.
+    first = check_drive(day)[0]
+    assert (first.id, first.serious) == ("clock.splices", True)
+    assert not any(p.id == "clock.splices" for part in parts for p in check_drive(part))
+    jumping = ("vehicle_speed", "gnss_speed", "latitude", "longitude", "altitude")
+    vouched = replace(day, info=replace(day.info, trusted=jumping))
+    assert not any(p.id == "clock.splices" for p in check_drive(vouched))
+    assert len(parted(vouched)) == 1
 
 
 @pytest.mark.parametrize(("period", "least"), [(0.25, 20.0), (0.5, 25.0), (1.0, 36.0)])
@@ -237,7 +245,7 @@ def test_a_splice_is_refused_by_its_name(trips):
     time = speed.time[0] + np.arange(values.size)
     drive = wb.Drive("d", {"vehicle_speed": Signal("vehicle_speed", time, values)})
     serious = [p.id for p in check_drive(drive) if p.serious]
-    assert serious[0] == "speed.splices"
+    assert serious[0] == "clock.splices"
 
 
 def test_zeros_where_no_value_was_are_left_out(trips):

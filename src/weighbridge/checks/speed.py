@@ -14,8 +14,7 @@ import numpy as np
 
 from weighbridge.checks import windows
 from weighbridge.messages import phrase
-from weighbridge.signals import UNITS, Drive, Floats, Problem, Signal, find_splices
-from weighbridge.signals.instants import instant
+from weighbridge.signals import UNITS, Drive, Floats, Problem, Signal
 from weighbridge.vehicle import Vehicle
 from weighbridge.vehicle.classes import FASTEST, STRONGEST
 
@@ -92,16 +91,7 @@ def check_scales(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
 def _check_alone(drive: Drive, speed: Signal, vehicle: Vehicle | None) -> Iterator[Problem]:
     """Question a speed that nothing else of the drive can be compared with."""
     why = _beyond_belief(drive, speed, vehicle)
-    if why and (jumps := find_splices(drive)):
-        yield Problem.of(
-            "speed.splices",
-            speed.name,
-            serious=True,
-            why=why,
-            count=len(jumps),
-            at=instant(jumps[0].end),
-        )
-    elif why:
+    if why:
         stem = "speed" if speed.name == "gnss_speed" else speed.name
         said = drive.units.get(speed.name, "mps")
         smaller = [u for u in _SPEEDS if UNITS[u].factor < 0.9 * UNITS[said].factor]
