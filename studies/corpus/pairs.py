@@ -110,6 +110,8 @@ OTHER_EQUIPMENT: Final[dict[str, Callable[[Drive], Drive]]] = {
     "accelerometer alone": lambda d: d.without(*IMU[3:]),
     "speed alone": lambda d: d.without(*IMU, *GNSS),
     "calculated axis": lambda d: _derived(d),
+    "torque cut off": lambda d: _cut_off(d),
+    "no IMU, torque cut off": lambda d: _cut_off(d.without(*IMU)),
 }
 """What some are seen through."""
 
@@ -289,6 +291,18 @@ def _derived(drive: Drive) -> Drive:
     s = drive.signals["vehicle_speed"]
     rate = np.gradient(s.values, s.time)
     return drive.without(*IMU).with_signals(Signal("longitudinal_accel", s.time, rate))
+
+
+CUT_OFF: Final = {"engine_load": 0.5, "engine_torque_fraction": 0.5, "engine_torque": 70.0}
+"""A device of few bits gives no more than this of a reading [-], [N m]."""
+
+
+def _cut_off(drive: Drive) -> Drive:
+    """End the reading of the torque below what the engine gives."""
+    found = [s for name in CUT_OFF if (s := drive.get(name)) is not None]
+    return drive.with_signals(
+        *(Signal(s.name, s.time, np.minimum(s.values, CUT_OFF[s.name])) for s in found)
+    )
 
 
 def _averaged(drive: Drive, *, span: float, names: tuple[str, ...] = IMU) -> Drive:
@@ -562,6 +576,17 @@ def _in_feet() -> Iterator[Pair]:
             )  # fmt: skip
 
 
+def _cut_offs() -> Iterator[Pair]:
+    """A device that cuts the torque off in all drives, those of the calibration too."""
+    for of in ("own car", "own electric", "second petrol", "second van", "second truck"):
+        for name in ("drive",) if of.startswith("own") else ("ordinary", "motorway"):
+            for equipment in ("torque cut off", "no IMU, torque cut off"):
+                yield Pair(
+                    f"{of}/{name}/{equipment}", f"device: {equipment}", of, equipment,
+                    partial(_seen, drive=name, equipment=equipment), sound=False,
+                )  # fmt: skip
+
+
 def _other_sensors() -> Iterator[Pair]:
     """Calibrated with an inertial sensor and weighed without, and with one without a gyroscope."""
     for of in MADE:
@@ -613,7 +638,7 @@ def all_pairs() -> list[Pair]:
         *_of_equipment(), *_cuts(), *_off_clocks(), *_faults(), *_heights(), *_recordings(),
         *_strangers(),
         *_misread_pairs(), *_in_feet(), *_other_sensors(), *_other_rates(),
-        *_gearboxes(),
+        *_gearboxes(), *_cut_offs(),
     ]  # fmt: skip
 
 

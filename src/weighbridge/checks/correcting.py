@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Final
 
 import numpy as np
@@ -83,34 +84,43 @@ def _without_false(drive: Drive, name: str) -> Drive:
 
 
 def _without_ends(drive: Drive, name: str, vehicle: Vehicle | None) -> Drive:
-    """Leave out what lies at ends of the range that the calibration had wider."""
-    if vehicle is None or name != vehicle.torque.of_source.signals[0]:
-        return drive
-    signal, model, dragged = drive.signals[name], vehicle.torque, vehicle.dragged
-    notes: list[Problem] = []
-    highest = np.inf
-    if model.load_range is not None:
-        # Of other sources the range is not that of the signal.
-        as_read = model.of_source.needs_map
-        highest = model.load_range[1] / WIDENED if as_read else np.inf
-    elif dragged is not None:
-        highest = dragged.span + min(dragged.level)
-    marked = clipped(signal, highest)
-    if marked.any():
-        notes.append(
-            Problem.of(
-                "torque.cut_off",
-                name,
-                serious=bool(np.mean(marked) > CUT_OFF and signal.values.max() < CUT_TO * highest),
-                most=show(name, float(signal.values.max())),
-                count=np.count_nonzero(marked),
-                samples=len(signal),
-                highest=show(name, highest),
+    """Leave out what lies at an end of the reading: the torque is there or beyond."""
+    signal = drive.signals[name]
+    own = vehicle if vehicle and name == vehicle.torque.of_source.signals[0] else None
+    dragged = own.dragged if own is not None else None
+    marked, notes = np.zeros(len(signal), dtype=bool), list[Problem]()
+    if own is not None and math.isfinite(highest := _highest(own)):
+        marked = clipped(signal, highest)
+        if marked.any():
+            notes.append(
+                Problem.of(
+                    "torque.cut_off",
+                    name,
+                    serious=bool(
+                        np.mean(marked) > CUT_OFF and signal.values.max() < CUT_TO * highest
+                    ),
+                    most=show(name, float(signal.values.max())),
+                    count=np.count_nonzero(marked),
+                    samples=len(signal),
+                    highest=show(name, highest),
+                )
             )
-        )
-    if not np.isfinite(highest) and model.of_source.signed:
-        marked, more = _piled(signal, vehicle)
-        notes += more
+    # The lowest is looked at of motors alone: an engine that is dragged reads the same for long.
+    motor = vehicle is not None and vehicle.driveline.single_speed
+    for lowest in (False, True)[: 1 + motor]:
+        found = piled(signal, lowest=lowest) & ~marked
+        if found.any():
+            marked |= found
+            notes.append(
+                Problem.of(
+                    "torque.at_limit",
+                    name,
+                    word=phrase("falls_below") if lowest else phrase("exceeds"),
+                    limit=show(name, float(signal.values[found][0])),
+                    count=np.count_nonzero(found),
+                    samples=len(signal),
+                )
+            )
     if dragged is not None and len(signal) > 200:
         floor = min(dragged.level) + 3.0 * dragged.scatter
         if floor < 0.0 <= float(signal.values.min()):
@@ -130,29 +140,13 @@ def _without_ends(drive: Drive, name: str, vehicle: Vehicle | None) -> Drive:
     return drive.with_signals(_without(signal, marked)).with_problems(*notes)
 
 
-def _piled(signal: Signal, vehicle: Vehicle) -> tuple[Bools, list[Problem]]:
-    """Mark a torque's samples at ends at which it is cut off, and say so.
-
-    At a motor's own limit they show nothing wrong; the rest weighs without them as well. The lowest
-    is looked at of motors alone: an engine that is dragged reads the same for long.
-    """
-    marked, notes = np.zeros(len(signal), dtype=bool), list[Problem]()
-    for lowest in (False, True)[: 1 + vehicle.driveline.single_speed]:
-        found = piled(signal, lowest=lowest)
-        if found.any():
-            marked |= found
-            end = float(signal.values[found][0])
-            notes.append(
-                Problem.of(
-                    "torque.at_limit",
-                    signal.name,
-                    word=phrase("falls_below") if lowest else phrase("exceeds"),
-                    limit=show(signal.name, end),
-                    count=np.count_nonzero(found),
-                    samples=len(signal),
-                )
-            )
-    return marked, notes
+def _highest(vehicle: Vehicle) -> float:
+    """Return the highest reading of the calibration; infinite where it is not known."""
+    model, dragged = vehicle.torque, vehicle.dragged
+    if model.load_range is not None:
+        # Of other sources the range is not that of the signal.
+        return model.load_range[1] / WIDENED if model.of_source.needs_map else math.inf
+    return dragged.span + min(dragged.level) if dragged is not None else math.inf
 
 
 def _without(signal: Signal, marked: Bools) -> Signal:

@@ -10,7 +10,7 @@ from typing import Final
 
 import numpy as np
 
-from weighbridge.signals import Bools, Drive, Floats, Signal
+from weighbridge.signals import QUANTITIES, Bools, Drive, Floats, Signal
 from weighbridge.signals.runs import runs_of
 
 LONGEST: Final = 0.5
@@ -47,6 +47,9 @@ simulated vehicles had 0.002 at most at the top, electric ones 0.0015 at the bot
 
 BESIDE: Final = 0.1
 """They are more than all samples within this part of the range beside it [-]."""
+
+FULL_LOAD: Final = (0.99, 1.01)
+"""A reading in percent that ends here is not cut off: an engine holds its full load [-]."""
 
 PILED: Final = 0.005
 """Part of the samples that repeat the highest reading where it is cut off [-]."""
@@ -122,9 +125,13 @@ def piled(signal: Signal, *, lowest: bool = False) -> Bools:
     if values.size < 200:
         return nothing
     end = float(values.max())
+    if QUANTITIES[signal.name].suffix == "pct" and FULL_LOAD[0] <= end <= FULL_LOAD[1]:
+        return nothing
     at_end = values == end
     span = end - float(np.percentile(values, 5.0))
-    beside = np.count_nonzero(~at_end & (values > end - BESIDE * span))
+    others = values[~at_end]
+    # Of a coarse reading, at least its next step.
+    beside = np.count_nonzero(others >= min(end - BESIDE * span, others.max(initial=-np.inf)))
     count = np.count_nonzero(at_end)
     runs = runs_of(signal)
     often = np.count_nonzero((values[runs.first] == end) & (runs.length > 1))
