@@ -50,7 +50,6 @@ __all__ = ["check_drive", "correct_drive", "refuse_serious"]
 _Check = Callable[[Drive, "Vehicle | None"], Iterator[Problem]]
 
 _CHECKS: Final[tuple[_Check, ...]] = (
-    check_splices,
     check_stuck,
     check_frozen,
     check_limit,
@@ -62,11 +61,14 @@ _CHECKS: Final[tuple[_Check, ...]] = (
     check_engine_speed,
     check_idle,
     check_standstill,
+    check_splices,
     check_scales,
     check_imu,
-    check_vehicle,
     check_range,
 )
+
+_LAST: Final[tuple[_Check, ...]] = (check_vehicle, check_reading)
+"""What froze or dropped out is not held against the rest."""
 
 
 def correct_drive(drive: Drive, vehicle: Vehicle | None = None) -> Drive:
@@ -115,20 +117,22 @@ def _corrected(drive: Drive, vehicle: Vehicle | None) -> Drive:
         drive = without_smoothed(correct_clocks(drive), vehicle)
     problems = [*drive.problems[len(earlier) :], *found]
     if not any(p.serious for p in problems):
-        problems += (
-            replace(p, serious=False) if p.signal in drive.info.trusted else p
-            for check in _CHECKS
-            for p in check(drive, vehicle)
-        )
+        problems += _found(_CHECKS, drive, vehicle)
     problems.sort(key=lambda p: not p.serious)
     clean = replace(within_ranges(drive), problems=(*earlier, *problems))
     if any(p.serious for p in problems):
         return clean
     clean = with_forward_accel(corrected(clean, vehicle))
-    # Last: what froze or dropped out is not held against a second signal.
-    problems = [*clean.problems[len(earlier) :], *check_reading(clean, vehicle)]
+    problems = [*clean.problems[len(earlier) :], *_found(_LAST, clean, vehicle)]
     problems.sort(key=lambda p: not p.serious)
     return replace(clean, problems=(*earlier, *problems))
+
+
+def _found(checks: tuple[_Check, ...], drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
+    """What checks find; never serious of a signal that a person vouches for."""
+    for check in checks:
+        for p in check(drive, vehicle):
+            yield replace(p, serious=False) if p.signal in drive.info.trusted else p
 
 
 def refuse_serious(name: str, problems: Iterable[Problem]) -> None:
