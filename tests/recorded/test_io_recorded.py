@@ -74,7 +74,7 @@ def test_bmw_trips_raise_no_alarm(bmw):
 
 def test_cut_of_one_bmw_trip_is_noted(bmw):
     drive = next(d for d in bmw if d.name == "TripB02")
-    assert any(p.id == "speed.jumps" for p in check_drive(drive))
+    assert any(p.id == "clock.splices" for p in check_drive(drive))
 
 
 @pytest.mark.parametrize("factor", [0.621371, 1.609344, 1 / 3.6])

@@ -10,7 +10,7 @@ import weighbridge as wb
 from weighbridge import Signal, read_drives
 from weighbridge.checks import check_drive, correct_drive
 from weighbridge.io import write_table
-from weighbridge.signals import find_splices, parted
+from weighbridge.signals import find_splices, longest_part, parted
 from weighbridge.simulation import make_scenario, simulate_car
 
 LONG = 400.0
@@ -127,13 +127,27 @@ def test_a_splice_on_one_clock_is_found(trips):
     assert [p.duration for p in parts] == pytest.approx([200.0] * 3, abs=1.5)
     assert not any(find_splices(p) for p in parts)
     assert not any(find_splices(t) for t in trips)
-    # As one drive it has no mass, unless a person vouches for what jumps.
-    first = check_drive(day)[0]
-    assert (first.id, first.serious) == ("clock.splices", True)
-    assert not any(p.id == "clock.splices" for part in parts for p in check_drive(part))
+
+
+def test_of_joined_recordings_read_as_one_drive_the_longest_is_used(trips):
+    cut = []
+    for trip, shift, length in zip(trips, (0.0, 0.1, 0.2), (200.0, 300.0, 250.0), strict=True):
+        signals = {}
+        for name, s in trip.signals.items():
+            rows = (s.time >= trip.start + 100.0) & (s.time < trip.start + 100.0 + length)
+            values = s.values[rows] + (shift if name == "latitude" else 0.0)
+            signals[name] = Signal(name, s.time[rows], values)
+        cut.append(replace(trip, signals=signals))
+    day = behind(cut, 0.05)
+    kept = longest_part(day)
+    assert [p.id for p in kept.problems] == ["clock.splices"]
+    assert kept.duration == pytest.approx(300.0, abs=1.5)
+    assert correct_drive(day).duration == pytest.approx(kept.duration, abs=1.5)
+    assert longest_part(kept) is kept
+    # A person may vouch for what jumps.
     jumping = ("vehicle_speed", "gnss_speed", "latitude", "longitude", "altitude")
     vouched = replace(day, info=replace(day.info, trusted=jumping))
-    assert not any(p.id == "clock.splices" for p in check_drive(vouched))
+    assert longest_part(vouched) is vouched
     assert len(parted(vouched)) == 1
 
 
@@ -235,17 +249,6 @@ def test_a_few_spikes_are_left_out_and_told(trips):
         p.id == "range.spikes"
         for p in check_drive(trip.with_signals(replace(speed, values=values)))
     )
-
-
-def test_a_splice_is_refused_by_its_name(trips):
-    speed = trips[0].signals["vehicle_speed"]
-    rng = np.random.default_rng(4)
-    pieces = [5.0 + 38.0 * (k % 2) + rng.normal(0.0, 0.3, 40) for k in range(30)]
-    values = np.concatenate(pieces)
-    time = speed.time[0] + np.arange(values.size)
-    drive = wb.Drive("d", {"vehicle_speed": Signal("vehicle_speed", time, values)})
-    serious = [p.id for p in check_drive(drive) if p.serious]
-    assert serious[0] == "clock.splices"
 
 
 def test_zeros_where_no_value_was_are_left_out(trips):

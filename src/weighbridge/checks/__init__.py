@@ -15,7 +15,6 @@ from weighbridge.checks.clocks import (
     check_overlap,
     check_pauses,
     check_rates,
-    check_splices,
     without_slow,
 )
 from weighbridge.checks.correcting import corrected
@@ -39,7 +38,7 @@ from weighbridge.checks.values import check_load, check_retarder, check_stuck
 from weighbridge.checks.vehicle import check_vehicle
 from weighbridge.navigation.along import with_forward_accel
 from weighbridge.navigation.clock_drift import correct_clocks
-from weighbridge.signals import Drive, Problem
+from weighbridge.signals import Drive, Problem, longest_part
 from weighbridge.signals.catalogue import REPORTED_LOAD
 from weighbridge.signals.held import without_repeats
 from weighbridge.signals.timeline import one_recording, well_formed
@@ -47,7 +46,7 @@ from weighbridge.vehicle import Vehicle
 
 __all__ = ["check_drive", "correct_drive", "refuse_serious"]
 
-_Check = Callable[[Drive, "Vehicle | None"], Iterator[Problem]]
+_Check = Callable[[Drive, "Vehicle | None"], Iterable[Problem]]
 
 _CHECKS: Final[tuple[_Check, ...]] = (
     check_stuck,
@@ -61,7 +60,6 @@ _CHECKS: Final[tuple[_Check, ...]] = (
     check_engine_speed,
     check_idle,
     check_standstill,
-    check_splices,
     check_scales,
     check_imu,
     check_range,
@@ -104,7 +102,7 @@ def _corrected(drive: Drive, vehicle: Vehicle | None) -> Drive:
     drive = well_formed(drive)
     if found := tuple(check_rates(drive, vehicle)):
         return drive.with_problems(*found)
-    drive = without_slow(one_recording(drive))
+    drive = without_slow(longest_part(one_recording(drive)))
     found = tuple(check_overlap(drive, vehicle))
     if any(p.serious for p in found):
         return drive.with_problems(*found)

@@ -11,16 +11,7 @@ import numpy as np
 from weighbridge.constants import EARTH_RADIUS
 from weighbridge.messages import phrase
 from weighbridge.navigation.aiding import SLOWEST
-from weighbridge.signals import (
-    NO_DRIVE,
-    QUANTITIES,
-    Drive,
-    Floats,
-    Problem,
-    Signal,
-    driven_parts,
-    find_splices,
-)
+from weighbridge.signals import NO_DRIVE, QUANTITIES, Drive, Floats, Problem, Signal
 from weighbridge.signals.catalogue import IMU_SIGNALS, TABLES
 from weighbridge.signals.instants import instant, span
 from weighbridge.vehicle import Vehicle
@@ -172,21 +163,6 @@ def check_pauses(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
                 at=instant(start),
                 harmless=harmless,
             )
-
-
-def check_splices(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
-    """Find recordings that were put one behind another on one clock: each has a mass of its own."""
-    if found := find_splices(drive):
-        times = phrase("times_first", count=len(found)) if len(found) > 1 else "once,"
-        yield Problem.of(
-            "clock.splices",
-            serious=len(driven_parts(drive, found)) > 1,
-            start=found[0].end,
-            end=found[0].end,
-            why=found[0].why,
-            times=times,
-            at=instant(found[0].end),
-        )
 
 
 def _way_agrees(drive: Drive, start: float, length: float) -> bool:

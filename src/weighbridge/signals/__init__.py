@@ -14,7 +14,7 @@ from weighbridge.signals.lag import (
     parabola,
 )
 from weighbridge.signals.moving import moving_mean
-from weighbridge.signals.parts import driven_parts, find_restarts, find_splices, numbered, parted
+from weighbridge.signals.parts import find_restarts, find_splices, longest_part, numbered, parted
 from weighbridge.signals.recent import (
     BEHIND,
     LONGEST_STEP,
@@ -67,7 +67,6 @@ __all__ = [
     "best_lag",
     "clean_columns",
     "clean_signal",
-    "driven_parts",
     "find_lag",
     "find_restarts",
     "find_splices",
@@ -75,6 +74,7 @@ __all__ = [
     "huber",
     "lag_std",
     "lag_std_at",
+    "longest_part",
     "lowest",
     "median_of_three",
     "median_slope",

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from weighbridge.constants import EARTH_RADIUS
 from weighbridge.limits import DRIVES, STANDS
-from weighbridge.messages import Problem
+from weighbridge.messages import Problem, phrase
 from weighbridge.signals.drive import Drive
-from weighbridge.signals.instants import span
+from weighbridge.signals.instants import instant, span
 from weighbridge.signals.signal import Floats, Signal
 from weighbridge.signals.timeline import STANDS_FOR
 
@@ -94,14 +94,47 @@ def parted(drive: Drive) -> tuple[Drive, ...]:
     cuts = find_cuts(drive)
     if not cuts:
         return (drive,)
-    driven = driven_parts(drive, cuts)
+    driven = _driven_parts(drive, cuts)
     if len(driven) < 2:
         return (drive,)
     why = " and ".join(dict.fromkeys(c.why for c in cuts))
     return numbered(drive.name, driven, why, len(cuts) + 1 - len(driven))
 
 
-def driven_parts(drive: Drive, cuts: Sequence[Cut]) -> list[Drive]:
+def longest_part(drive: Drive) -> Drive:
+    """Leave the longest of several recordings that were joined: each has a mass of its own.
+
+    Pauses and long stops stay: whoever reads a recording as one drive knows of them.
+
+    Parameters
+    ----------
+    drive : on clocks that rise
+
+    Returns
+    -------
+    Drive
+        The drive itself where it is one; else what was left out is in its ``problems``.
+    """
+    cuts = find_splices(drive)
+    parts = _driven_parts(drive, cuts) if cuts else []
+    if len(parts) < 2:
+        return drive
+    longest = max(parts, key=lambda part: part.duration)
+    times = phrase("times_first", count=len(cuts)) if len(cuts) > 1 else "once,"
+    return longest.with_problems(
+        Problem.of(
+            "clock.splices",
+            start=drive.start,
+            end=drive.end,
+            why=cuts[0].why,
+            times=times,
+            at=instant(cuts[0].end),
+            span=span(round(longest.start), round(longest.end)),
+        )
+    )
+
+
+def _driven_parts(drive: Drive, cuts: Sequence[Cut]) -> list[Drive]:
     """Parts of a drive between cuts, in order, without those in which the vehicle hardly moves."""
     starts = [-np.inf, *(c.begin for c in cuts)]
     ends = [*(c.end for c in cuts), np.inf]
@@ -138,6 +171,7 @@ def numbered(name: str, parts: Sequence[Drive], why: str, idle: int = 0) -> tupl
     )
 
 
+@np.errstate(invalid="ignore", over="ignore")
 def find_splices(drive: Drive) -> list[Cut]:
     """Find where speed, position or coolant jump as no vehicle's do, and stay where they are.
 
@@ -282,8 +316,7 @@ def _position_jumps(lat: Signal, longitude: Floats, speed: Signal | None) -> lis
         driven = np.diff(np.interp([since[:-1], lat.time[1:]], speed.time, length), axis=0)[0]
     east_per_angle = np.cos(lat.values[:-1])
     way = EARTH_RADIUS * np.hypot(np.diff(lat.values), np.diff(longitude) * east_per_angle)
-    with np.errstate(invalid="ignore"):
-        places = np.flatnonzero((step < _NEAR) & (way > _FAR + _FASTEST * step + _BEYOND * driven))
+    places = np.flatnonzero((step < _NEAR) & (way > _FAR + _FASTEST * step + _BEYOND * driven))
     north = _rise(*_windows(lat.values, places))
     east = _rise(*_windows(longitude, places)) * east_per_angle[places]
     stays = EARTH_RADIUS * np.hypot(north, east) > 0.6 * way[places]
