@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import math
+import tomllib
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final, Literal
+from importlib.resources import files
+from typing import Any, Final, Literal
 
 import numpy as np
 
@@ -244,88 +247,38 @@ def rpm(*values: float) -> tuple[float, ...]:
     return tuple(v * RPM for v in values)
 
 
-MIDSIZE: Final = SimulatedCar(
-    name="midsize petrol, 7-speed dual clutch",
-    mass=1580.0,
-    gear_ratios=(3.188, 2.190, 1.517, 1.057, 0.738, 0.557, 0.433),
-    final_drive=4.234,
-    wheel_radius=0.319,
-    engine_inertia=0.16,
-    wheel_inertia=5.5,
-    drag_area=0.27 * 2.2,
-    rolling_coefficient=0.0085,
-    curve_speed=rpm(700, 1000, 1450, 4200, 5000, 6000, 6200),
-    curve_torque=(120.0, 200.0, 320.0, 320.0, 271.0, 226.0, 215.0),
-    idle_speed=850 * RPM,
-    max_speed=6200 * RPM,
-    drag_torque=(21.0, 0.010, 9.0e-5),
+_TO_SI: Final[dict[str, Callable[[float], float]]] = {
+    "_rpm": lambda value: value * RPM,
+    "_deg": math.radians,
+    "_kmh": lambda value: value / 3.6,
+}
+_LISTED: Final = tomllib.loads(
+    files("weighbridge.simulation").joinpath("vehicles.toml").read_text(encoding="utf-8")
 )
-"""The car of Jensen 2022, Table 1 (2018 Audi A4 2.0 petrol); what the table
-does not give is typical of its class."""
 
-COMPACT: Final = SimulatedCar(
-    name="compact petrol, 5-speed manual",
-    mass=1165.0,
-    transmission="manual",
-    gear_ratios=(3.769, 2.045, 1.281, 0.951, 0.756),
-    final_drive=3.95,
-    wheel_radius=0.292,
-    engine_inertia=0.11,
-    wheel_inertia=3.4,
-    drag_area=0.32 * 2.10,
-    rolling_coefficient=0.0092,
-    curve_speed=rpm(700, 1000, 2000, 3000, 4000, 5000, 6000, 6500),
-    curve_torque=(60.0, 95.0, 112.0, 121.0, 127.0, 122.0, 110.0, 98.0),
-    idle_speed=750 * RPM,
-    max_speed=6500 * RPM,
-    drag_torque=(13.0, 0.008, 6.0e-5),
-    loss_constant=2.5,
-    loss_slope=0.035,
-    torque_lag=0.10,
-    shift_time=0.9,
-    shift_floor=0.0,
-    upshift=2400 * RPM,
-    downshift=1450 * RPM,
-    accessory_power=550.0,
-    load_full=0.90,
-    load_curvature=-0.05,
-    load_speed_slope=-0.07,
-    load_smoothing=0.10,
-    squat=math.radians(0.27),
-    load_pitch=3.2e-5,
-    roll_gain=math.radians(0.48),
-    pitch_frequency=1.45,
-    tyre_slip=0.042,
-)
+
+def listed_car(name: str) -> SimulatedCar:
+    """Return a vehicle of `vehicles.toml`, which explains its keys."""
+    given: dict[str, Any] = {}
+    for key, value in _LISTED[name].items():
+        unit = key[-4:]
+        if unit in _TO_SI:
+            key, turned = key.removesuffix(unit), _TO_SI[unit]
+            value = list(map(turned, value)) if isinstance(value, list) else turned(value)
+        given[key] = tuple(value) if isinstance(value, list) else value
+    given["drag_area"] = given.pop("drag_coefficient") * given.pop("frontal_area")
+    if "stall_torque" in given:
+        given["converter_capacity"] = given.pop("stall_torque") / given.pop("stall_speed") ** 2
+    return SimulatedCar(**given)
+
+
+MIDSIZE: Final = listed_car("midsize")
+"""The car of Jensen 2022, Table 1."""
+
+COMPACT: Final = listed_car("compact")
 """A small car with a naturally aspirated engine and a manual gearbox."""
 
-ELECTRIC: Final = SimulatedCar(
-    name="electric, single speed",
-    mass=1620.0,
-    engine="electric",
-    transmission="single",
-    gear_ratios=(1.0,),
-    final_drive=9.3,
-    wheel_radius=0.325,
-    engine_inertia=0.035,
-    wheel_inertia=4.8,
-    drag_area=0.28 * 2.3,
-    rolling_coefficient=0.0080,
-    curve_speed=rpm(0, 3600, 5000, 7000, 9000, 12000),
-    curve_torque=(290.0, 290.0, 210.0, 150.0, 115.0, 86.0),
-    idle_speed=0.0,
-    max_speed=12000 * RPM,
-    drag_torque=(0.0, 0.0, 0.0),
-    loss_constant=1.0,
-    loss_slope=0.025,
-    torque_lag=0.08,
-    shift_time=0.1,
-    accessory_power=0.0,
-    compressor_power=0.0,
-    regeneration=90.0,
-    squat=math.radians(0.18),
-    cylinders=0,
-)
+ELECTRIC: Final = listed_car("electric")
 """A car with one fixed gear whose control unit reports the motor torque."""
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import replace
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -12,6 +13,7 @@ from weighbridge.arguments import suggestion
 from weighbridge.errors import ConfigError
 from weighbridge.simulation.car import COMPACT, ELECTRIC, MIDSIZE, SimulatedCar
 from weighbridge.simulation.route import (
+    Route,
     bus_route,
     highway_route,
     hilly_route,
@@ -37,10 +39,6 @@ _ELECTRIC_POLLING: Final = Polling(
 )
 
 
-def _car(payload: float, seed: int) -> Scenario:
-    return Scenario(name="car", car=MIDSIZE, route=jensen_route(), payload=payload, seed=seed)
-
-
 def _calibrating(name: str, car: SimulatedCar, route_seed: int = 4) -> Maker:
     """Return what drives a vehicle through all gears, loads and engine speeds."""
 
@@ -58,34 +56,6 @@ def _calibrating(name: str, car: SimulatedCar, route_seed: int = 4) -> Maker:
         )
 
     return make
-
-
-def _short(payload: float, seed: int) -> Scenario:
-    return Scenario(name="car-short", car=MIDSIZE, route=short_route(), payload=payload, seed=seed)
-
-
-def _loading(payload: float, seed: int) -> Scenario:
-    stop = Loading(distance=11_000.0, duration=90.0, load=240.0)
-    return replace(_car(payload, seed), name="car-loading", loading=(stop,))
-
-
-def _highway(payload: float, seed: int) -> Scenario:
-    return Scenario(name="highway", car=MIDSIZE, route=highway_route(), payload=payload, seed=seed)
-
-
-def _compact(payload: float, seed: int) -> Scenario:
-    return Scenario(name="compact", car=COMPACT, route=jensen_route(6), payload=payload, seed=seed)
-
-
-def _electric(payload: float, seed: int) -> Scenario:
-    return Scenario(
-        name="electric",
-        car=ELECTRIC,
-        route=jensen_route(8),
-        payload=payload,
-        seed=seed,
-        polling=_ELECTRIC_POLLING,
-    )
 
 
 _BUS_POLLING: Final = Polling(
@@ -166,18 +136,26 @@ def usual_polling(car: SimulatedCar) -> Polling:
     return _DIESEL_POLLING if car.engine == "diesel" else Polling()
 
 
-def _on_the_road(name: str, car: SimulatedCar, seed: int) -> Maker:
-    def make(payload: float, drive_seed: int) -> Scenario:
+def _on_the_road(name: str, car: SimulatedCar, route: Callable[[], Route]) -> Maker:
+    def make(payload: float, seed: int) -> Scenario:
         return Scenario(
             name=name,
             car=car,
-            route=jensen_route(seed),
+            route=route(),
             payload=payload,
-            seed=drive_seed,
+            seed=seed,
             polling=usual_polling(car),
         )
 
     return make
+
+
+_car: Final = _on_the_road("car", MIDSIZE, jensen_route)
+
+
+def _loading(payload: float, seed: int) -> Scenario:
+    stop = Loading(distance=11_000.0, duration=90.0, load=240.0)
+    return replace(_car(payload, seed), name="car-loading", loading=(stop,))
 
 
 def _bus(payload: float, seed: int) -> Scenario:
@@ -236,24 +214,24 @@ def _passengers(places: Iterable[float], payload: float, seed: int) -> tuple[Loa
 SCENARIOS: Final[dict[str, Maker]] = {
     "car": _car,
     "car-calibration": _calibrating("car-calibration", MIDSIZE),
-    "car-short": _short,
+    "car-short": _on_the_road("car-short", MIDSIZE, short_route),
     "car-loading": _loading,
-    "highway": _highway,
-    "compact": _compact,
+    "highway": _on_the_road("highway", MIDSIZE, highway_route),
+    "compact": _on_the_road("compact", COMPACT, partial(jensen_route, 6)),
     "compact-calibration": _calibrating("compact-calibration", COMPACT, 7),
-    "electric": _electric,
+    "electric": _on_the_road("electric", ELECTRIC, partial(jensen_route, 8)),
     "bus": _bus,
     "bus-urban": _bus_urban,
     "bus-calibration": _calibrating("bus-calibration", BUS, 13),
-    "diesel": _on_the_road("diesel", DIESEL_AUTOMATIC, 14),
+    "diesel": _on_the_road("diesel", DIESEL_AUTOMATIC, partial(jensen_route, 14)),
     "diesel-calibration": _calibrating("diesel-calibration", DIESEL_AUTOMATIC, 15),
-    "cvt": _on_the_road("cvt", STEPLESS, 20),
+    "cvt": _on_the_road("cvt", STEPLESS, partial(jensen_route, 20)),
     "cvt-calibration": _calibrating("cvt-calibration", STEPLESS, 21),
-    "hybrid": _on_the_road("hybrid", POWER_SPLIT, 22),
+    "hybrid": _on_the_road("hybrid", POWER_SPLIT, partial(jensen_route, 22)),
     "hybrid-calibration": _calibrating("hybrid-calibration", POWER_SPLIT, 23),
-    "van": _on_the_road("van", VAN, 16),
+    "van": _on_the_road("van", VAN, partial(jensen_route, 16)),
     "van-calibration": _calibrating("van-calibration", VAN, 17),
-    "truck": _on_the_road("truck", TRUCK18, 18),
+    "truck": _on_the_road("truck", TRUCK18, partial(jensen_route, 18)),
     "truck-calibration": _calibrating("truck-calibration", TRUCK18, 19),
 }
 """Makers of the named scenarios, from payload [kg] and seed."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from functools import partial
 from typing import Final, Literal, get_args
@@ -16,8 +15,8 @@ from weighbridge.simulation.car import (
     RPM,
     PowerSplit,
     SimulatedCar,
+    listed_car,
     random_car,
-    rpm,
 )
 from weighbridge.simulation.scenario import Habits
 
@@ -34,269 +33,25 @@ VehicleKind = Literal[
 ]
 """Kinds of random vehicles."""
 
-DIESEL_AUTOMATIC: Final = SimulatedCar(
-    name="diesel car, 8-speed automatic",
-    mass=1750.0,
-    engine="diesel",
-    transmission="automatic",
-    gear_ratios=(4.714, 3.143, 2.106, 1.667, 1.285, 1.000, 0.839, 0.667),
-    final_drive=2.813,
-    wheel_radius=0.313,
-    engine_inertia=0.27,
-    wheel_inertia=5.8,
-    drag_area=0.27 * 2.25,
-    rolling_coefficient=0.0085,
-    curve_speed=rpm(700, 1000, 1250, 1750, 3000, 4000, 4600),
-    curve_torque=(130.0, 210.0, 290.0, 380.0, 380.0, 325.0, 250.0),
-    idle_speed=780 * RPM,
-    max_speed=4600 * RPM,
-    drag_torque=(24.0, 0.012, 1.1e-4),
-    loss_constant=6.0,
-    loss_slope=0.035,
-    torque_lag=0.20,
-    shift_time=0.35,
-    shift_floor=0.65,
-    upshift=1650 * RPM,
-    downshift=1080 * RPM,
-    gear_skip=2,
-    converter_capacity=380.0 / (2100 * RPM) ** 2,
-    stall_ratio=2.0,
-    lock_gear=3,
-    lock_speed=1150 * RPM,
-    load_full=1.0,
-    load_curvature=0.04,
-    load_speed_slope=-0.05,
-    squat=math.radians(0.20),
-    load_pitch=2.2e-5,
-)
-"""A midsize car with a 2.0 l diesel of 136 kW and a torque-converter automatic of the
-gear ratios of the ZF 8HP. The converter stalls at 2100 rpm at full torque and
-doubles it, usual figures (Gillespie, Fundamentals of Vehicle Dynamics, 1992, ch. 2;
-Heisler, Advanced Vehicle Technology, ch. 4)."""
+DIESEL_AUTOMATIC: Final = listed_car("diesel_automatic")
+"""A midsize car with a diesel and a torque-converter automatic."""
 
-STEPLESS: Final = SimulatedCar(
-    name="petrol car, stepless gearbox",
-    mass=1330.0,
-    transmission="stepless",
-    gear_ratios=(2.63, 0.38),
-    final_drive=5.25,
-    wheel_radius=0.305,
-    engine_inertia=0.15,
-    wheel_inertia=4.4,
-    drag_area=0.29 * 2.25,
-    rolling_coefficient=0.0088,
-    curve_speed=rpm(700, 1000, 2000, 3000, 4000, 5200, 6000, 6400),
-    curve_torque=(80.0, 118.0, 145.0, 156.0, 163.0, 157.0, 143.0, 126.0),
-    idle_speed=700 * RPM,
-    max_speed=6400 * RPM,
-    drag_torque=(16.0, 0.009, 7.0e-5),
-    loss_constant=3.5,
-    loss_slope=0.06,
-    torque_lag=0.10,
-    converter_capacity=163.0 / (2300 * RPM) ** 2,
-    stall_ratio=1.9,
-    lock_gear=1,
-    lock_speed=1700 * RPM,
-    economy_speed=1250 * RPM,
-    power_share=0.75,
-    ratio_lag=0.5,
-    ratio_bend=0.35,
-    pump=0.009,
-    accessory_power=600.0,
-    load_full=0.92,
-    load_curvature=-0.04,
-    load_speed_slope=-0.05,
-    load_smoothing=0.10,
-    squat=math.radians(0.24),
-    load_pitch=2.8e-5,
-    roll_gain=math.radians(0.45),
-    pitch_frequency=1.4,
-    tyre_slip=0.038,
-)
-"""A car of the middle with a naturally aspirated engine of 1.8 l and a push-belt variator behind a
-converter, of ratios 2.6 to 0.4 as such boxes have. The belt and its pump lose 8 to 20 % of the
-power, least near a ratio of one (Srivastava and Haque, A review on belt and chain continuously
-variable transmissions, Mechanism and Machine Theory 44, 2009)."""
+STEPLESS: Final = listed_car("stepless")
+"""A car with a push-belt variator behind a converter."""
 
 POWER_SPLIT: Final = replace(
     STEPLESS, name="petrol hybrid, power split", mass=1420.0, split=PowerSplit()
 )
 """A hybrid that moves as the car with a stepless gearbox does: who gives the power is another."""
 
-VAN: Final = SimulatedCar(
-    name="diesel van, 6-speed manual",
-    kind="van",
-    mass=2100.0,
-    engine="diesel",
-    transmission="manual",
-    gear_ratios=(5.076, 2.610, 1.518, 1.000, 0.791, 0.680),
-    final_drive=3.923,
-    wheel_radius=0.342,
-    engine_inertia=0.30,
-    wheel_inertia=10.0,
-    drag_area=0.35 * 4.8,
-    rolling_coefficient=0.0095,
-    curve_speed=rpm(700, 1000, 1250, 1500, 2400, 3000, 3800, 4500),
-    curve_torque=(110.0, 190.0, 270.0, 330.0, 330.0, 305.0, 263.0, 170.0),
-    idle_speed=780 * RPM,
-    max_speed=4500 * RPM,
-    drag_torque=(26.0, 0.013, 1.2e-4),
-    loss_constant=5.0,
-    loss_slope=0.035,
-    torque_lag=0.20,
-    shift_time=1.0,
-    shift_floor=0.0,
-    upshift=2150 * RPM,
-    downshift=1250 * RPM,
-    accessory_power=900.0,
-    load_full=1.0,
-    load_curvature=-0.04,
-    load_speed_slope=0.05,
-    brake_drag=25.0,
-    top_speed=130 / 3.6,
-    liveliness=0.85,
-    wind_height=1.35,
-    yaw_drag=4.0,
-    tyre_cooling=0.010,
-    warm_up_time=900.0,
-    squat=math.radians(0.22),
-    squat_load=0.7,
-    load_pitch=1.2e-5,
-    roll_gain=math.radians(0.55),
-    pitch_frequency=1.4,
-    roll_frequency=1.3,
-    heave_frequency=1.5,
-    wheelbase=3.66,
-    track=1.72,
-    tyre_slip=0.038,
-)
-"""A van of 3.5 t permitted mass with a 2.1 l diesel of 105 kW; ratios, size and drag typical
-of its class. Loaded, it sits nose up by 1 degree."""
+VAN: Final = listed_car("van")
+"""A van of 3.5 t permitted mass."""
 
-TRUCK18: Final = SimulatedCar(
-    name="rigid truck of 18 t, diesel, 12-speed automated",
-    kind="truck",
-    mass=9000.0,
-    engine="diesel",
-    transmission="automated",
-    gear_ratios=(
-        12.33, 9.59, 7.44, 5.78, 4.57, 3.55, 2.70, 2.10, 1.63, 1.27, 1.00, 0.78,
-    ),
-    final_drive=4.11,
-    wheel_radius=0.485,
-    engine_inertia=1.4,
-    wheel_inertia=82.0,
-    drag_area=0.60 * 9.2,
-    rolling_coefficient=0.0065,
-    curve_speed=rpm(600, 800, 1000, 1200, 1750, 2000, 2300, 2500),
-    curve_torque=(450.0, 650.0, 900.0, 1100.0, 1100.0, 995.0, 885.0, 450.0),
-    idle_speed=600 * RPM,
-    max_speed=2500 * RPM,
-    drag_torque=(65.0, 0.12, 8.0e-4),
-    loss_constant=14.0,
-    loss_slope=0.03,
-    torque_lag=0.25,
-    shift_time=0.9,
-    shift_floor=0.0,
-    upshift=1480 * RPM,
-    downshift=1020 * RPM,
-    launch_gear=3,
-    gear_skip=2,
-    accessory_power=4000.0,
-    compressor_power=4000.0,
-    load_full=1.0,
-    load_curvature=0.03,
-    load_speed_slope=0.03,
-    torque_curvature=0.03,
-    load_smoothing=0.05,
-    brake_rise=0.40,
-    brake_fall=0.30,
-    brake_drag=100.0,
-    retarder_force=12_000.0,
-    top_speed=89 / 3.6,
-    liveliness=0.5,
-    wind_height=1.9,
-    yaw_drag=6.0,
-    tyre_cooling=0.006,
-    warm_up_time=2400.0,
-    squat=math.radians(0.08),
-    squat_load=1.0,
-    load_pitch=1.0e-6,
-    roll_gain=math.radians(0.55),
-    pitch_frequency=1.8,
-    roll_frequency=0.9,
-    heave_frequency=1.7,
-    wheelbase=5.1,
-    track=2.0,
-    tyre_slip=0.030,
-    side_slip=0.004,
-    cylinders=6,
-)  # fmt: skip
-"""A two-axle box truck with a 6.9 l diesel of 213 kW, a gearbox of the ratios of a ZF
-12AS1210 and the speed limiter of Directive 92/6/EEC. C_d, tyres and inertias as Wong,
-Theory of Ground Vehicles, ch. 3, and Gillespie, ch. 4, give them for trucks; air brakes rise
-within the 0.6 s of UN Regulation 13."""
+TRUCK18: Final = listed_car("truck")
+"""A two-axle box truck."""
 
-BUS: Final = SimulatedCar(
-    name="bus, diesel, 6-speed automated",
-    kind="bus",
-    mass=7000.0,
-    engine="diesel",
-    transmission="automated",
-    gear_ratios=(6.75, 3.60, 2.13, 1.39, 1.00, 0.78),
-    final_drive=3.545,
-    wheel_radius=0.49,
-    engine_inertia=1.1,
-    wheel_inertia=62.0,
-    drag_area=0.69 * 7.9,
-    rolling_coefficient=0.0075,
-    curve_speed=rpm(600, 800, 1000, 1200, 1600, 1900, 2300, 2600),
-    curve_torque=(420.0, 560.0, 750.0, 850.0, 850.0, 800.0, 685.0, 420.0),
-    idle_speed=700 * RPM,
-    max_speed=2600 * RPM,
-    drag_torque=(50.0, 0.10, 7.0e-4),
-    loss_constant=8.0,
-    loss_slope=0.035,
-    torque_lag=0.25,
-    shift_time=0.8,
-    shift_floor=0.0,
-    upshift=1450 * RPM,
-    downshift=950 * RPM,
-    accessory_power=4500.0,
-    compressor_power=3500.0,
-    load_full=1.0,
-    load_curvature=0.03,
-    load_speed_slope=0.03,
-    torque_curvature=0.03,
-    load_smoothing=0.05,
-    brake_rise=0.35,
-    brake_fall=0.30,
-    brake_drag=60.0,
-    retarder_force=9000.0,
-    top_speed=100 / 3.6,
-    liveliness=0.6,
-    wind_height=1.6,
-    yaw_drag=5.0,
-    tyre_cooling=0.006,
-    warm_up_time=1800.0,
-    squat=math.radians(0.10),
-    squat_load=1.0,
-    load_pitch=1.5e-7,
-    roll_gain=math.radians(0.55),
-    pitch_frequency=1.1,
-    roll_frequency=0.8,
-    heave_frequency=1.15,
-    wheelbase=5.2,
-    track=2.05,
-    tyre_slip=0.030,
-    side_slip=0.004,
-    cylinders=6,
-)
-"""The bus of Du 2025, Table 1: empty mass, C_d, frontal area, tyre radius, axle ratio and,
-nearly, driveline efficiency (0.95). Its rolling coefficient of 0.0005 is a tenth of any tyre's;
-0.0075 is usual for buses (Wong, Theory of Ground Vehicles, ch. 3, gives 0.006 to 0.01 for truck
-tyres). The table gives no powertrain: a six-cylinder diesel of 6.7 l and 165 kW and a six-speed
-box of a medium bus, its clutch opened by the control unit for every shift."""
+BUS: Final = listed_car("bus")
+"""The bus of Du 2025, Table 1."""
 
 
 def _between(rng: np.random.Generator, low: float, high: float) -> float:
