@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Final, Literal
+from typing import Any, Final, Literal
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
@@ -18,6 +18,7 @@ STEP: Final = 1.0
 
 RoadKind = Literal["city", "hills", "country", "highway"]
 
+_ALONG: Final = ("grade", "heading", "bank", "limit", "surface", "roughness", "exposure")
 _LIMIT: Final = {"city": 50 / 3.6, "hills": 50 / 3.6, "country": 80 / 3.6, "highway": 110 / 3.6}
 _GRADE_STD: Final = {"city": 0.010, "hills": 0.020, "country": 0.014, "highway": 0.009}
 _GRADE_LENGTH: Final = {"city": 110.0, "hills": 110.0, "country": 160.0, "highway": 350.0}
@@ -62,7 +63,7 @@ class Route:
 
     def __post_init__(self) -> None:
         n = self.grade.size
-        for name in ("heading", "bank", "limit", "surface", "roughness", "exposure"):
+        for name in _ALONG:
             if getattr(self, name).shape != (n,):
                 raise ConfigError(f"{name} of a route must have the length of its grade, {n}")
         if n < 50:
@@ -88,39 +89,17 @@ class Route:
         """Return the first ``end`` metres of the route."""
         n = int(end / STEP) + 1
         keep = self.stops < end - 30.0
-        return Route(
-            name=self.name,
-            grade=self.grade[:n],
-            heading=self.heading[:n],
-            bank=self.bank[:n],
-            limit=self.limit[:n],
-            surface=self.surface[:n],
-            roughness=self.roughness[:n],
-            exposure=self.exposure[:n],
-            stops=self.stops[keep],
-            stop_chance=self.stop_chance[keep],
-            latitude=self.latitude,
-            longitude=self.longitude,
-            altitude=self.altitude,
-        )
+        along = {name: getattr(self, name)[:n] for name in _ALONG}
+        return replace(self, stops=self.stops[keep], stop_chance=self.stop_chance[keep], **along)
 
 
 def flat_route(length: float, *, limit: float = 80 / 3.6, heading: float = 0.0) -> Route:
     """Return a straight and level road [m], [m/s], [rad]."""
     n = int(length / STEP) + 1
     one = np.ones(n)
-    return Route(
-        name="flat",
-        grade=0.0 * one,
-        heading=heading * one,
-        bank=0.0 * one,
-        limit=limit * one,
-        surface=one,
-        roughness=one,
-        exposure=one,
-        stops=np.empty(0),
-        stop_chance=np.empty(0),
-    )
+    values = {"grade": 0.0, "heading": heading, "bank": 0.0, "limit": limit}
+    along: dict[str, Any] = {name: values.get(name, 1.0) * one for name in _ALONG}
+    return Route(name="flat", stops=np.empty(0), stop_chance=np.empty(0), **along)
 
 
 def _smooth(values: Floats, sigma: float, mode: str = "nearest") -> Floats:

@@ -210,31 +210,11 @@ def _truth(scenario: Scenario, trajectory: Trajectory, pose: Pose) -> Truth:
         return np.ascontiguousarray(values[::_STRIDE])
 
     accel = np.gradient(trajectory.speed, DT)
-    return Truth(
-        time=cut(trajectory.time),
-        distance=cut(trajectory.distance),
-        speed=cut(trajectory.speed),
-        accel=cut(accel),
-        specific_force=cut(accel + GRAVITY * np.sin(pose.grade)),
-        grade=cut(pose.grade),
-        pitch=cut(pose.pitch),
-        roll=cut(pose.roll),
-        heading=np.mod(cut(pose.heading), 2.0 * math.pi),
-        altitude=cut(pose.altitude),
-        latitude=cut(pose.latitude),
-        longitude=cut(pose.longitude),
-        mass=cut(trajectory.mass),
-        engine_speed=cut(trajectory.engine_speed),
-        engine_torque=cut(trajectory.engine_torque),
-        load=cut(engine_load(scenario, trajectory)),
-        gear=cut(trajectory.gear),
-        phase=cut(trajectory.phase),
-        traction_force=cut(trajectory.traction_force),
-        brake_force=cut(trajectory.brake_force),
-        drag_force=cut(trajectory.drag_force),
-        rolling_force=cut(trajectory.rolling_force),
-        wind_along=cut(trajectory.wind_along),
-        fuel_flow=cut(trajectory.fuel_flow),
-        pedal=cut(trajectory.pedal),
-        brake_pedal=cut(trajectory.brake_pedal),
-    )
+    values = trajectory._asdict() | pose._asdict()
+    values |= {
+        "accel": accel,
+        "specific_force": accel + GRAVITY * np.sin(pose.grade),
+        "heading": np.mod(pose.heading, 2.0 * math.pi),
+        "load": engine_load(scenario, trajectory),
+    }
+    return Truth(**{f.name: cut(values[f.name]) for f in fields(Truth)})
