@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final, Optional
+from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
-from weighbridge.cli.listed import TellsMethods, method_names, slice_names
+from weighbridge.cli.listed import TellsMethods, argument, method_names, option, slice_names
 from weighbridge.cli.progress import progress
 from weighbridge.cli.results import Inputs, Result, asked_for, refuse_results, write_json
 from weighbridge.cli.terminal import console, say, shown
@@ -40,36 +40,13 @@ _HEADS: Final = {
 
 @app.command()
 def make(
-    output: Annotated[
-        Path,
-        typer.Option(
-            "-o",
-            "--output",
-            help="Folder to write: new, empty, or the same benchmark, interrupted.",
-            show_default=False,
-        ),
-    ],
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of all random numbers.")] = 1,
-    vehicles: Annotated[
-        int,
-        typer.Option(
-            "--vehicles", help="Number of vehicles of each class, equipment and calibration."
-        ),
-    ] = 1,
-    drives: Annotated[
-        int, typer.Option("--drives", help="Number of drives to weigh per vehicle.")
-    ] = 4,
-    minutes: Annotated[
-        float, typer.Option("--minutes", help="Length of a drive in minutes.")
-    ] = 20.0,
+    output: Annotated[Path, option("benchmark make --output")],
+    seed: Annotated[int, option("--seed", min=0)] = 1,
+    vehicles: Annotated[int, option("benchmark make --vehicles")] = 1,
+    drives: Annotated[int, option("benchmark make --drives")] = 4,
+    minutes: Annotated[float, option("--minutes")] = 20.0,
     only: Annotated[
-        Optional[list[str]],  # noqa: UP045  (typer reads the annotation at run time)
-        typer.Option(
-            "--only",
-            help="Class (car, electric, van, truck, bus), equipment (imu-50hz, imu-10hz, no-imu, "
-            "obd-1hz) or calibration (three, one, sheet) to make alone; repeat it for more.",
-            autocompletion=slice_names,
-        ),
+        list[str] | None, option("benchmark make --only", autocompletion=slice_names)
     ] = None,
 ) -> None:
     """Simulate drives of unknown mass, as folders of Parquet tables, with the truth apart.
@@ -93,13 +70,9 @@ def make(
 
 @app.command(cls=TellsMethods)
 def run(
-    folder: Annotated[Path, typer.Argument(help="Benchmark.", show_default=False)],
-    output: Annotated[
-        Path, typer.Option("-o", "--output", help="CSV file to write.", show_default=False)
-    ],
-    method: Annotated[
-        str, typer.Option("--method", help="Estimator.", autocompletion=method_names)
-    ] = "joint",
+    folder: Annotated[Path, argument("benchmark run FOLDER")],
+    output: Annotated[Path, option("benchmark run --output")],
+    method: Annotated[str, option("--method", autocompletion=method_names)] = "joint",
 ) -> None:
     """Calibrate the vehicles of a benchmark and weigh their drives with one method.
 
@@ -126,22 +99,9 @@ def run(
 
 @app.command()
 def score(
-    results: Annotated[
-        list[Path],
-        typer.Argument(
-            help="CSV with drive, mass_kg and, if known, std_kg, low_kg and high_kg; several are "
-            "compared over all drives.",
-            show_default=False,
-        ),
-    ],
-    truth: Annotated[
-        Optional[Path],  # noqa: UP045
-        typer.Option("--truth", help="truth.csv of the benchmark; the one beside the results."),
-    ] = None,
-    json_path: Annotated[
-        Optional[str],  # noqa: UP045
-        typer.Option("--json", help="Write the score as JSON to a file, or - for standard output."),
-    ] = None,
+    results: Annotated[list[Path], argument("benchmark score RESULTS")],
+    truth: Annotated[Path | None, option("benchmark score --truth")] = None,
+    json_path: Annotated[str | None, option("benchmark score --json")] = None,
 ) -> None:
     """Score the masses of any program, slice by slice.
 

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from weighbridge.cli.listed import option
 from weighbridge.cli.options import DbcPaths, JsonPath, MappingPath, OneDrive, chosen_mapping, load
 from weighbridge.cli.results import asked_for, inputs, refuse_results, write_json
 from weighbridge.cli.terminal import say
@@ -14,22 +15,9 @@ from weighbridge.cli.terminal import say
 
 def bound(
     drive: OneDrive,
-    vehicle: Annotated[
-        Path,
-        typer.Option("--vehicle", help="Vehicle file with its road load.", show_default=False),
-    ],
-    power: Annotated[
-        float,
-        typer.Option(
-            "--power",
-            help="Full power at the wheels in kW. The engine's power is valid too, but gives a"
-            " higher bound.",
-            show_default=False,
-        ),
-    ],
-    power_std: Annotated[
-        float, typer.Option("--power-std", help="Standard deviation of the power in percent.")
-    ] = 5.0,
+    vehicle: Annotated[Path, option("bound --vehicle")],
+    power: Annotated[float, option("bound --power")],
+    power_std: Annotated[float, option("bound --power-std")] = 5.0,
     json_path: JsonPath = None,
     mapping: MappingPath = None,
     dbc: DbcPaths = None,

@@ -5,11 +5,11 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final, Optional
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
-from weighbridge.cli.listed import method_names, source_names
+from weighbridge.cli.listed import method_names, option, source_names
 from weighbridge.cli.options import (
     DbcPaths,
     DrivePaths,
@@ -57,86 +57,23 @@ def _kilograms(text: str) -> float:
         raise typer.BadParameter(f"{text!r} is no mass: {remedy}") from None
 
 
-_Output = Annotated[
-    Path, typer.Option("-o", "--output", help="Vehicle file to write.", show_default=False)
-]
-_Masses = Annotated[
-    Optional[list[float]],  # noqa: UP045
-    typer.Option(
-        "--mass",
-        help="Known mass in kg at the start of the drive. If the masses differ, repeat it:"
-        " once for each recording, or once for each drive in the recordings. Without "
-        "it, mass_kg of each drive.toml is used.",
-        parser=_kilograms,
-        metavar="KG",
-    ),
-]
-_Base = Annotated[
-    Optional[Path],  # noqa: UP045
-    typer.Option(
-        "--vehicle", help="Vehicle file with what is known already: class, wheel radius, gearings."
-    ),
-]
-_Tare = Annotated[
-    Optional[float],  # noqa: UP045
-    typer.Option("--tare", help="Mass without payload in kg; payload is the mass minus the tare."),
-]
-_Method = Annotated[
-    str,
-    typer.Option(
-        "--method",
-        help="Estimator to calibrate for: joint, rls, speed-torque-ekf or speed-ekf.",
-        autocompletion=method_names,
-    ),
-]
-_Order = Annotated[
-    Optional[int],  # noqa: UP045
-    typer.Option("--order", min=0, max=4, help="Power of engine speed in the torque fit."),
-]
-_Torque = Annotated[
-    Optional[str],  # noqa: UP045
-    typer.Option("--torque", help="Torque source of the drives.", autocompletion=source_names),
-]
-_Grid = Annotated[
-    bool,
-    typer.Option(
-        "--grid",
-        help="Train as Jensen 2022 prints it, with --method rls: its filter, and plain squares on "
-        "the grid of Table 5.",
-    ),
-]
-_Changes = Annotated[
-    Optional[list[str]],  # noqa: UP045
-    typer.Option(
-        "--set",
-        help="Change a setting of --grid, such as grid_wheels=1,20,1 (lower and upper limit, "
-        "step); repeat it for more.",
-        metavar="NAME=VALUE",
-    ),
-]
-_Straight = Annotated[
-    bool,
-    typer.Option("--straight", help="Torque linear in load, as eq. 49 of Jensen 2022 prints."),
-]
-
-
 def calibrate(
     drives: DrivePaths,
-    output: _Output,
-    mass: _Masses = None,
-    vehicle: _Base = None,
-    tare: _Tare = None,
-    method: _Method = "joint",
-    order: _Order = None,
-    torque: _Torque = None,
-    grid: _Grid = False,
-    changes: _Changes = None,
-    straight: _Straight = False,
+    output: Annotated[Path, option("--output")],
+    mass: Annotated[list[float] | None, option("calibrate --mass", parser=_kilograms)] = None,
+    vehicle: Annotated[Path | None, option("calibrate --vehicle")] = None,
+    tare: Annotated[float | None, option("calibrate --tare")] = None,
+    method: Annotated[str, option("calibrate --method", autocompletion=method_names)] = "joint",
+    order: Annotated[int | None, option("calibrate --order", min=0, max=4)] = None,
+    torque: Annotated[str | None, option("--torque", autocompletion=source_names)] = None,
+    grid: Annotated[bool, option("calibrate --grid")] = False,
+    changes: Annotated[list[str] | None, option("calibrate --set")] = None,
+    straight: Annotated[bool, option("calibrate --straight")] = False,
     whole: Whole = False,
     mapping: MappingPath = None,
     dbc: DbcPaths = None,
     elevation: Elevation = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
+    force: Annotated[bool, option("--force")] = False,
 ) -> None:
     """Calibrate a vehicle from drives of known mass.
 

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Optional
+from typing import Annotated
 
-import typer
-
+from weighbridge.cli.listed import option
 from weighbridge.cli.options import DbcPaths, JsonPath, MappingPath, OneDrive, chosen_mapping, load
 from weighbridge.cli.results import asked_for, inputs, refuse_results, write_json
 from weighbridge.cli.terminal import say
@@ -14,28 +13,9 @@ from weighbridge.cli.terminal import say
 
 def coast(
     drive: OneDrive,
-    there: Annotated[
-        list[str],
-        typer.Option(
-            "--there",
-            help="Coast-down in one direction, FROM:TO in seconds; give at least two.",
-            metavar="FROM:TO",
-            show_default=False,
-        ),
-    ],
-    back: Annotated[
-        list[str],
-        typer.Option(
-            "--back",
-            help="Coast-down in the other direction, FROM:TO in seconds; give at least two.",
-            metavar="FROM:TO",
-            show_default=False,
-        ),
-    ],
-    vehicle: Annotated[
-        Optional[Path],  # noqa: UP045  (typer reads the annotation at run time)
-        typer.Option("--vehicle", help="Vehicle file with wheel inertia and tare."),
-    ] = None,
+    there: Annotated[list[str], option("coast --there")],
+    back: Annotated[list[str], option("coast --back")],
+    vehicle: Annotated[Path | None, option("coast --vehicle")] = None,
     json_path: JsonPath = None,
     mapping: MappingPath = None,
     dbc: DbcPaths = None,

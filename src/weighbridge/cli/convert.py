@@ -5,9 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
-from weighbridge.cli.listed import FORMATS, one_of
+from weighbridge.cli.listed import FORMATS, argument, one_of, option
 from weighbridge.cli.options import (
     DbcPaths,
     MappingPath,
@@ -26,29 +24,14 @@ from weighbridge.errors import ConfigError, DriveError
 
 
 def convert(
-    drive: Annotated[
-        Path,
-        typer.Argument(
-            help="Drive: a folder of tables or of logs (joined by time), or one log.",
-            show_default=False,
-        ),
-    ],
-    out: Annotated[
-        Path, typer.Argument(help="Folder to write, or an .mf4 file.", show_default=False)
-    ],
+    drive: Annotated[Path, argument("convert DRIVE")],
+    out: Annotated[Path, argument("convert OUT")],
     table_format: Annotated[
-        str,
-        typer.Option(
-            "--format",
-            help="Format of the tables in a folder: parquet or csv.",
-            autocompletion=one_of(*FORMATS),
-        ),
+        str, option("convert --format", autocompletion=one_of(*FORMATS))
     ] = "parquet",
     mapping: MappingPath = None,
     dbc: DbcPaths = None,
-    force: Annotated[
-        bool, typer.Option("--force", help="Replace an existing folder or file.")
-    ] = False,
+    force: Annotated[bool, option("convert --force")] = False,
 ) -> None:
     """Write a drive with canonical names and units: a folder of tables, or one MF4.
 

@@ -6,8 +6,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
+from weighbridge.cli.listed import option
 from weighbridge.cli.options import Units
 from weighbridge.cli.progress import progress
 from weighbridge.cli.results import Result, inputs, refuse_results
@@ -28,17 +27,10 @@ PERMITTED = 2060.0
 
 
 def demo(
-    output: Annotated[Path, typer.Option("-o", "--output", help="Report to write.")] = Path(
-        "weighbridge-demo.html"
-    ),
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of all random numbers.")] = 7,
+    output: Annotated[Path, option("demo --output")] = Path("weighbridge-demo.html"),
+    seed: Annotated[int, option("--seed", min=0)] = 7,
     units: Units = "si",
-    open_report: Annotated[
-        bool,
-        typer.Option(
-            "--open/--no-open", help="Open the report in a browser; only when run on a terminal."
-        ),
-    ] = True,
+    open_report: Annotated[bool, option("demo --open/--no-open")] = True,
 ) -> None:
     """Simulate a calibration drive and three loaded drives, weigh them, write a report.
 

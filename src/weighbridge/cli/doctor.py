@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Optional
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from weighbridge.cli.listed import option
 from weighbridge.cli.results import Result, inputs, refuse_results, write_json
 from weighbridge.cli.terminal import console, say, shown
 from weighbridge.cli.verbosity import say_written
@@ -19,10 +20,7 @@ if TYPE_CHECKING:
 
 
 def doctor(
-    json_path: Annotated[
-        Optional[str],  # noqa: UP045  (typer reads the annotation at run time)
-        typer.Option("--json", help="Write a JSON object to a file, or - for standard output."),
-    ] = None,
+    json_path: Annotated[str | None, option("doctor --json")] = None,
 ) -> None:
     """Show what is installed: versions, extras, compiled kernels, and what is missing.
 

@@ -6,8 +6,7 @@ from pathlib import Path
 from threading import Event
 from typing import TYPE_CHECKING, Annotated, Final
 
-import typer
-
+from weighbridge.cli.listed import argument, option
 from weighbridge.cli.options import DbcPaths, MappingPath, load
 from weighbridge.cli.terminal import console, say
 from weighbridge.cli.verbosity import notice, watched
@@ -23,26 +22,11 @@ _WITHOUT: Final = {
 
 
 def emulate(
-    drive: Annotated[Path, typer.Argument(help="Recorded or simulated drive.", show_default=False)],
-    adapter: Annotated[
-        int, typer.Option("--elm", min=1, max=65535, help="TCP port of the ELM327 adapter.")
-    ] = 35000,
-    receiver: Annotated[
-        int, typer.Option("--nmea", min=1, max=65535, help="TCP port of the GNSS receiver.")
-    ] = 10110,
-    sensor: Annotated[
-        int,
-        typer.Option(
-            "--lines", min=1, max=65535, help="UDP port to which the inertial sensor sends."
-        ),
-    ] = 5005,
-    rate: Annotated[
-        float,
-        typer.Option(
-            "--rate",
-            help="Speed: 1 as recorded, 5 five times as fast; use the same --rate for live.",
-        ),
-    ] = 1.0,
+    drive: Annotated[Path, argument("emulate DRIVE")],
+    adapter: Annotated[int, option("emulate --elm", min=1, max=65535)] = 35000,
+    receiver: Annotated[int, option("emulate --nmea", min=1, max=65535)] = 10110,
+    sensor: Annotated[int, option("emulate --lines", min=1, max=65535)] = 5005,
+    rate: Annotated[float, option("emulate --rate")] = 1.0,
     mapping: MappingPath = None,
     dbc: DbcPaths = None,
 ) -> None:

@@ -6,13 +6,13 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final, Optional
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 from typer.core import TyperCommand, TyperGroup
 
 from weighbridge.cli import fleet_report
-from weighbridge.cli.listed import class_names, method_names
+from weighbridge.cli.listed import argument, class_names, method_names, option
 from weighbridge.cli.options import DbcPaths, Elevation, MappingPath, Whole
 from weighbridge.cli.progress import time_text
 from weighbridge.cli.terminal import complain, console, say, shown
@@ -64,91 +64,19 @@ app = typer.Typer(cls=RunsDrives, help="Weigh the drives of a fleet in parallel.
 app.command()(fleet_report.report)
 
 
-_Drives = Annotated[
-    list[str],
-    typer.Argument(
-        help="Folders, logs, patterns such as 'DRIVES/**' (quoted), URLs such as "
-        "s3://bucket/drives, or a table of drives (CSV or Parquet with a column files).",
-        show_default=False,
-    ),
-]
-_Vehicles = Annotated[
-    Path,
-    typer.Option(
-        "--vehicles",
-        help="Folder of vehicle files named ID.toml; the folder or file of a drive has the"
-        " name ID.",
-        show_default=False,
-    ),
-]
-_Output = Annotated[
-    str,
-    typer.Option(
-        "-o",
-        "--output",
-        help="Folder of the results, or a URL such as s3://bucket/results; drives that have a "
-        "result there are not weighed again.",
-        show_default=False,
-    ),
-]
-_Scheduler = Annotated[
-    Optional[str],  # noqa: UP045
-    typer.Option("--scheduler", help="Dask cluster, such as tcp://10.0.0.5:8786."),
-]
-_Workers = Annotated[
-    Optional[int],  # noqa: UP045
-    typer.Option("--workers", help="Processes on this machine; one per core by default."),
-]
-_Memory = Annotated[
-    Optional[str],  # noqa: UP045
-    typer.Option("--memory", help="Memory limit of each process, such as '1 GB'."),
-]
-_Kind = Annotated[
-    Optional[str],  # noqa: UP045
-    typer.Option(
-        "--class",
-        help="Class of vehicles that have no file, such as car, van, bus, truck; car by default. "
-        "Needed where none has one.",
-        autocompletion=class_names,
-    ),
-]
-_Learn = Annotated[
-    Optional[Path],  # noqa: UP045
-    typer.Option(
-        "--learn",
-        help="Correct masses by what the fleet shows of each vehicle's scale; folder for vehicle "
-        "files refined by --tickets.",
-    ),
-]
-_Tickets = Annotated[
-    Optional[Path],  # noqa: UP045
-    typer.Option("--tickets", help="Known masses: CSV or Parquet with vehicle, time, mass_kg."),
-]
-_Changes = Annotated[
-    Optional[list[str]],  # noqa: UP045
-    typer.Option(
-        "--set",
-        help="Change a setting of the estimator; repeat it for more.",
-        metavar="NAME=VALUE",
-    ),
-]
-
-
 @app.command(_RUN, cls=Unnamed, hidden=True)
 def run(
-    drives: _Drives,
-    vehicles: _Vehicles,
-    results: _Output,
-    scheduler: _Scheduler = None,
-    workers: _Workers = None,
-    memory: _Memory = None,
-    kind: _Kind = None,
-    method: Annotated[
-        str, typer.Option("--method", help="Estimator.", autocompletion=method_names)
-    ] = "joint",
-    changes: _Changes = None,
-    learn: _Learn = None,
-    tickets: _Tickets = None,
+    drives: Annotated[list[str], argument("fleet DRIVES")],
+    vehicles: Annotated[Path, option("fleet --vehicles")],
+    results: Annotated[str, option("fleet --output")],
+    scheduler: Annotated[str | None, option("fleet --scheduler")] = None,
+    workers: Annotated[int | None, option("fleet --workers")] = None,
+    memory: Annotated[str | None, option("fleet --memory")] = None,
+    kind: Annotated[str | None, option("fleet --class", autocompletion=class_names)] = None,
+    method: Annotated[str, option("--method", autocompletion=method_names)] = "joint",
+    changes: Annotated[list[str] | None, option("fleet --set")] = None,
+    learn: Annotated[Path | None, option("fleet --learn")] = None,
+    tickets: Annotated[Path | None, option("--tickets")] = None,
     whole: Whole = False,
     mapping: MappingPath = None,
     dbc: DbcPaths = None,
@@ -198,9 +126,7 @@ def run(
 
 @app.command()
 def status(
-    results: Annotated[
-        str, typer.Argument(help="Folder of the results, or their URL.", show_default=False)
-    ],
+    results: Annotated[str, argument("RESULTS")],
 ) -> None:
     """Show how far a run is: drives weighed, drives without a mass and why, and the time left.
 

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final, Optional
+from typing import TYPE_CHECKING, Annotated, Final
 
-import typer
-
+from weighbridge.cli.listed import argument, option
 from weighbridge.cli.results import Inputs, asked_for, refuse_results
 from weighbridge.cli.terminal import say
 from weighbridge.cli.verbosity import say_written
@@ -18,56 +17,17 @@ if TYPE_CHECKING:
 
 _REPORTED: Final = 10  # legs in the answer, and vehicles of what was learnt
 
-_Couplings = Annotated[
-    Optional[Path],  # noqa: UP045
-    typer.Option(
-        "--couplings",
-        help="Times with a trailer: CSV or Parquet with vehicle, start, end, permitted_kg "
-        "(vehicle and trailer together).",
-    ),
-]
-_Warn = Annotated[
-    float,
-    typer.Option("--warn", help="Probability from which an overload is reported as likely."),
-]
-_Alarm = Annotated[
-    float,
-    typer.Option("--alarm", help="Probability from which an overload is reported as certain."),
-]
-_Tolerance = Annotated[
-    float,
-    typer.Option(
-        "--tolerance", help="Largest error that passes the tests of known mass, as a share."
-    ),
-]
-
 
 def report(
-    results: Annotated[
-        str, typer.Argument(help="Folder of the results, or their URL.", show_default=False)
-    ],
-    page: Annotated[
-        Optional[Path],  # noqa: UP045
-        typer.Option("-o", "--output", help="Page to write, an HTML file that opens offline."),
-    ] = None,
-    json: Annotated[
-        Optional[str],  # noqa: UP045
-        typer.Option("--json", help="File to which the same figures are written as JSON."),
-    ] = None,
-    legs: Annotated[
-        Optional[Path],  # noqa: UP045
-        typer.Option(
-            "--legs", help="Write a table of all legs, payload with its interval: .csv or .parquet."
-        ),
-    ] = None,
-    tickets: Annotated[
-        Optional[Path],  # noqa: UP045
-        typer.Option("--tickets", help="Known masses: CSV or Parquet with vehicle, time, mass_kg."),
-    ] = None,
-    couplings: _Couplings = None,
-    warn: _Warn = 0.5,
-    alarm: _Alarm = 0.95,
-    tolerance: _Tolerance = 0.05,
+    results: Annotated[str, argument("RESULTS")],
+    page: Annotated[Path | None, option("fleet report --output")] = None,
+    json: Annotated[str | None, option("fleet report --json")] = None,
+    legs: Annotated[Path | None, option("fleet report --legs")] = None,
+    tickets: Annotated[Path | None, option("--tickets")] = None,
+    couplings: Annotated[Path | None, option("fleet report --couplings")] = None,
+    warn: Annotated[float, option("fleet report --warn")] = 0.5,
+    alarm: Annotated[float, option("fleet report --alarm")] = 0.95,
+    tolerance: Annotated[float, option("fleet report --tolerance")] = 0.05,
 ) -> None:
     """Report overloaded vehicles, transport, changes of load, and how good the data are.
 

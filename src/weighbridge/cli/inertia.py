@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Optional
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from weighbridge.cli.listed import filter_names
+from weighbridge.cli.listed import filter_names, option
 from weighbridge.cli.options import (
     DbcPaths,
     JsonPath,
@@ -26,32 +26,11 @@ if TYPE_CHECKING:
 
 def inertia(
     drive: OneDrive,
-    vehicle: Annotated[
-        Path,
-        typer.Option("--vehicle", help="Vehicle file with its suspension.", show_default=False),
-    ],
-    method: Annotated[
-        str,
-        typer.Option(
-            "--method",
-            help="Filter: kalman-bucy; or inverse, extended or printed, with one fixed process"
-            " noise.",
-            autocompletion=filter_names,
-        ),
-    ] = "kalman-bucy",
-    settings: Annotated[
-        Optional[list[str]],  # noqa: UP045  (typer reads the annotation at run time)
-        typer.Option(
-            "--set",
-            help="Change a setting of the filter, such as jump_rate=1e-3; repeat it for more.",
-            metavar="NAME=VALUE",
-        ),
-    ] = None,
+    vehicle: Annotated[Path, option("inertia --vehicle")],
+    method: Annotated[str, option("inertia --method", autocompletion=filter_names)] = "kalman-bucy",
+    settings: Annotated[list[str] | None, option("inertia --set")] = None,
     json_path: JsonPath = None,
-    track: Annotated[
-        Optional[Path],  # noqa: UP045
-        typer.Option("--track", help="Write the parameters over time: .csv or .parquet."),
-    ] = None,
+    track: Annotated[Path | None, option("inertia --track")] = None,
     report: ReportPath = None,
     mapping: MappingPath = None,
     dbc: DbcPaths = None,

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NamedTuple, Optional
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
-import typer
-
+from weighbridge.cli.listed import option
 from weighbridge.cli.options import (
     DbcPaths,
     DrivePaths,
@@ -40,19 +39,9 @@ def inspect(
     drives: DrivePaths,
     mapping: MappingPath = None,
     dbc: DbcPaths = None,
-    vehicle: Annotated[
-        Optional[Path],  # noqa: UP045
-        typer.Option("--vehicle", help="Vehicle file; its gearings check the speed."),
-    ] = None,
-    every_way: Annotated[
-        bool, typer.Option("--all", help="Also list the methods for which signals are missing.")
-    ] = False,
-    json_path: Annotated[
-        Optional[str],  # noqa: UP045
-        typer.Option(
-            "--json", help="Write one JSON object per drive to a file, or - for standard output."
-        ),
-    ] = None,
+    vehicle: Annotated[Path | None, option("inspect --vehicle")] = None,
+    every_way: Annotated[bool, option("inspect --all")] = False,
+    json_path: Annotated[str | None, option("inspect --json")] = None,
     whole: Whole = False,
 ) -> None:
     """Show what a drive holds: signals, rates, gaps, problems, possible methods.

@@ -1,14 +1,44 @@
-"""Names that options take, of other packages too: in the help, and to complete in the shell."""
+"""Options of the commands: their words out of `options.toml`, and the names that they take."""
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Callable, Iterable
+from importlib.resources import files
 from typing import Any, Final
 
+import typer
 from typer.core import TyperCommand, TyperOption
 
 FORMATS: Final = ("parquet", "csv")
 """Formats of the tables of a drive."""
+
+_WORDS: Final = tomllib.loads(
+    files("weighbridge.cli").joinpath("options.toml").read_text(encoding="utf-8")
+)
+
+
+def option(name: str, **settings: Any) -> Any:
+    """Return an option of a command, with its words of `options.toml`.
+
+    Parameters
+    ----------
+    name : command and option, such as ``weigh --json``; the option alone where several share it
+    settings : of `typer.Option`
+    """
+    command, _, wanted = name.rpartition(" ")
+    for key, words in _WORDS[command or "every"].items():
+        if wanted in key.split():
+            flags = [part for part in key.split() if part.startswith("-")]
+            settings.setdefault("metavar", " ".join(key.split()[len(flags) :]) or None)
+            return typer.Option(*flags, help=words, **settings)
+    raise KeyError(name)
+
+
+def argument(name: str, **settings: Any) -> Any:
+    """Return an argument of a command, likewise, such as ``convert OUT``."""
+    command, _, key = name.rpartition(" ")
+    return typer.Argument(help=_WORDS[command or "every"][key], **settings)
 
 
 class TellsMethods(TyperCommand):

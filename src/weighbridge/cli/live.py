@@ -6,11 +6,11 @@ import math
 import signal
 from pathlib import Path
 from threading import Event
-from typing import TYPE_CHECKING, Annotated, Optional
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from weighbridge.cli.listed import source_kinds
+from weighbridge.cli.listed import option, source_kinds
 from weighbridge.cli.options import (
     DbcPaths,
     KeepDays,
@@ -50,128 +50,30 @@ if TYPE_CHECKING:
 
 _NO_STATE = "none"
 
-_VehiclePath = Annotated[
-    Path,
-    typer.Option(
-        "--vehicle", help="Vehicle file, written by calibrate or vehicle new.", show_default=False
-    ),
-]
-_Sources = Annotated[
-    Optional[list[str]],  # noqa: UP045
-    typer.Option(
-        "--source",
-        help="Source of samples, such as elm:/dev/ttyUSB0 or can:socketcan:can0; repeat it"
-        " for more. docs/live.md lists all.",
-        autocompletion=source_kinds,
-        metavar="KIND:PLACE",
-    ),
-]
-_Replay = Annotated[
-    Optional[Path],  # noqa: UP045
-    typer.Option("--replay", help="Use a recorded drive as the source.", metavar="DRIVE"),
-]
-_Rate = Annotated[
-    str,
-    typer.Option(
-        "--rate",
-        help="Speed of the replay: 1 as recorded, 10 ten times as fast, or max. For "
-        "emulated sources, the --rate of emulate; for a real vehicle, 1.",
-    ),
-]
-_Json = Annotated[
-    Optional[str],  # noqa: UP045
-    typer.Option(
-        "--json", help="Write a JSON line per weighing to a file, or - for standard output."
-    ),
-]
-_Mqtt = Annotated[
-    Optional[str],  # noqa: UP045
-    typer.Option("--mqtt", help="Send weighings to mqtt://USER:PASSWORD@HOST:PORT/PREFIX."),
-]
-_Page = Annotated[
-    Optional[str],  # noqa: UP045
-    typer.Option(
-        "--page",
-        help="Serve a page at this port, for this computer only; HOST:PORT for others too.",
-        metavar="[HOST:]PORT",
-    ),
-]
-_Record = Annotated[
-    Optional[Path],  # noqa: UP045
-    typer.Option("--record", help="Also record the samples as a drive.", metavar="DRIVE"),
-]
-_Every = Annotated[float, typer.Option("--every", help="Seconds between weighings.")]
-_Above = Annotated[
-    Optional[float],  # noqa: UP045
-    typer.Option("--above", help="Alert above this mass in kg; the permitted mass by default."),
-]
-_Below = Annotated[
-    Optional[float],  # noqa: UP045
-    typer.Option("--below", help="Alert below this mass in kg."),
-]
-_Ticket = Annotated[
-    Optional[float],  # noqa: UP045
-    typer.Option(
-        "--ticket",
-        help="Mass in kg from a weighbridge ticket: at the end, calibrate the vehicle with"
-        " this drive.",
-    ),
-]
-_Out = Annotated[
-    Optional[Path],  # noqa: UP045
-    typer.Option(
-        "-o",
-        "--out",
-        help="Vehicle file that --ticket writes; by default in the folder of the vehicle file.",
-    ),
-]
-_State = Annotated[
-    Optional[str],  # noqa: UP045
-    typer.Option(
-        "--state",
-        help="File that keeps the result over a power cut or a short stop; by default in "
-        "the folder of the vehicle file, none for a replay.",
-        metavar="FILE|none",
-    ),
-]
-_Orders = Annotated[
-    Optional[Path],  # noqa: UP045
-    typer.Option(
-        "--orders",
-        help="Read orders (tare, load or end, one on each line) from a named pipe, which "
-        "is made if missing, or from a file to which lines are added.",
-    ),
-]
-_Lateness = Annotated[
-    float, typer.Option("--lateness", help="Seconds by which a sample may be late.")
-]
-_ListenOnly = Annotated[
-    bool, typer.Option("--listen-only", help="Send nothing to the vehicle, not even requests.")
-]
-_Force = Annotated[bool, typer.Option("--force", help="Replace the file of -o.")]
-
 
 def live(
-    vehicle: _VehiclePath,
-    source: _Sources = None,
-    replay: _Replay = None,
-    rate: _Rate = "1",
-    json_path: _Json = None,
-    mqtt: _Mqtt = None,
-    page: _Page = None,
-    record: _Record = None,
+    vehicle: Annotated[Path, option("--vehicle")],
+    source: Annotated[
+        list[str] | None, option("live --source", autocompletion=source_kinds)
+    ] = None,
+    replay: Annotated[Path | None, option("live --replay")] = None,
+    rate: Annotated[str, option("live --rate")] = "1",
+    json_path: Annotated[str | None, option("live --json")] = None,
+    mqtt: Annotated[str | None, option("live --mqtt")] = None,
+    page: Annotated[str | None, option("live --page")] = None,
+    record: Annotated[Path | None, option("live --record")] = None,
     split_mb: SplitMb = None,
     keep_days: KeepDays = None,
-    every: _Every = 1.0,
-    above: _Above = None,
-    below: _Below = None,
-    ticket: _Ticket = None,
-    out: _Out = None,
-    state: _State = None,
-    orders: _Orders = None,
-    lateness: _Lateness = 1.0,
-    listen_only: _ListenOnly = False,
-    force: _Force = False,
+    every: Annotated[float, option("live --every")] = 1.0,
+    above: Annotated[float | None, option("live --above")] = None,
+    below: Annotated[float | None, option("live --below")] = None,
+    ticket: Annotated[float | None, option("live --ticket")] = None,
+    out: Annotated[Path | None, option("live --out")] = None,
+    state: Annotated[str | None, option("live --state")] = None,
+    orders: Annotated[Path | None, option("live --orders")] = None,
+    lateness: Annotated[float, option("live --lateness")] = 1.0,
+    listen_only: Annotated[bool, option("live --listen-only")] = False,
+    force: Annotated[bool, option("live --force")] = False,
     units: Units = "si",
     mapping: MappingPath = None,
     dbc: DbcPaths = None,

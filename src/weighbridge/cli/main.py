@@ -35,7 +35,7 @@ from weighbridge.cli import (
     vehicle,
     weigh,
 )
-from weighbridge.cli.listed import TellsMethods, TellsSources
+from weighbridge.cli.listed import TellsMethods, TellsSources, option
 from weighbridge.cli.terminal import STREAM, complain, guarded, leave_quietly, say
 from weighbridge.cli.verbosity import EveryCommand, Quiet, Verbose, asked_anew
 from weighbridge.errors import WeighbridgeError
@@ -83,12 +83,7 @@ def _print_version(wanted: bool) -> None:
 
 @app.callback()
 def options(
-    version: Annotated[
-        bool,
-        typer.Option(
-            "--version", callback=_print_version, is_eager=True, help="Print the version."
-        ),
-    ] = False,
+    version: Annotated[bool, option("--version", callback=_print_version, is_eager=True)] = False,
     quiet: Quiet = False,
     verbose: Verbose = 0,
 ) -> None:

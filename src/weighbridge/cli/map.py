@@ -6,10 +6,9 @@ import shlex
 import sys
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Optional
+from typing import TYPE_CHECKING, Annotated
 
-import typer
-
+from weighbridge.cli.listed import argument, option
 from weighbridge.cli.options import DbcPaths
 from weighbridge.cli.progress import each
 from weighbridge.cli.results import Result, inputs, refuse_overwriting, refuse_results
@@ -35,51 +34,18 @@ _ARRAYS = (
     "by number, as examples/comma2k19/mapping.toml does; docs/formats.md says how"
 )
 
-_Columns = Annotated[
-    Optional[str],  # noqa: UP045  (typer reads the annotation at run time)
-    typer.Option(
-        "--columns",
-        help="Column names, in order, for a text without a header: time_s,rpm,speed,-; a "
-        "dash for an unused column.",
-        metavar="NAMES",
-        show_default=False,
-    ),
-]
 
 _SHOWN = 12
 """Columns that are not taken, named at most."""
 
 
 def map_log(
-    logs: Annotated[
-        list[Path],
-        typer.Argument(
-            help="Logs of one drive or of one logger with other column names (CSV, Parquet …),"
-            " or a folder of such logs.",
-            show_default=False,
-        ),
-    ],
-    output: Annotated[
-        Optional[Path],  # noqa: UP045  (typer reads the annotation at run time)
-        typer.Option(
-            "-o", "--output", help="Mapping file to write; without it the mapping is printed."
-        ),
-    ] = None,
-    ask: Annotated[
-        bool,
-        typer.Option("--ask", help="Ask about everything uncertain: time, columns, units, rate."),
-    ] = False,
-    rate: Annotated[
-        Optional[float],  # noqa: UP045
-        typer.Option(
-            "--rate",
-            help="Rows per second, for a log without a clock.",
-            metavar="HZ",
-            show_default=False,
-        ),
-    ] = None,
-    columns: _Columns = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
+    logs: Annotated[list[Path], argument("map LOGS")],
+    output: Annotated[Path | None, option("map --output")] = None,
+    ask: Annotated[bool, option("map --ask")] = False,
+    rate: Annotated[float | None, option("map --rate")] = None,
+    columns: Annotated[str | None, option("map --columns")] = None,
+    force: Annotated[bool, option("--force")] = False,
     dbc: DbcPaths = None,
 ) -> None:
     """Draft the mapping of a log: its separator, time, columns and units.

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Optional
+from typing import TYPE_CHECKING, Annotated
 
-import typer
-
-from weighbridge.cli.listed import one_of
+from weighbridge.cli.listed import argument, one_of, option
 from weighbridge.cli.verbosity import show_in
 from weighbridge.customary import SYSTEMS
 
@@ -15,79 +13,19 @@ if TYPE_CHECKING:
     from weighbridge.signals import Drive
     from weighbridge.vehicle import Vehicle
 
-DrivePaths = Annotated[
-    list[Path],
-    typer.Argument(
-        help="One or more drives. A drive is a folder of tables, a folder of logs of one "
-        "drive (joined by time), or one log.",
-        show_default=False,
-    ),
-]
-OneDrive = Annotated[
-    Path, typer.Argument(help="Drive: folder of tables, or log file.", show_default=False)
-]
-JsonPath = Annotated[
-    Optional[str],  # noqa: UP045  (typer reads the annotation at run time)
-    typer.Option("--json", help="Write a JSON object to a file, or - for standard output."),
-]
-MappingPath = Annotated[
-    Optional[Path],  # noqa: UP045  (typer reads the annotation at run time)
-    typer.Option(
-        "--mapping",
-        help="Mapping: a TOML file that gives the meaning, unit and sign of each column.",
-    ),
-]
-ReportPath = Annotated[
-    Optional[Path],  # noqa: UP045
-    typer.Option("--report", help="Write a self-contained HTML report."),
-]
-DbcPaths = Annotated[
-    Optional[list[str]],  # noqa: UP045
-    typer.Option(
-        "--dbc",
-        help="DBC for raw CAN logs; repeat it for more files; write 1:FILE for bus 1 only.",
-        metavar="FILE",
-    ),
-]
-Elevation = Annotated[
-    Optional[Path],  # noqa: UP045
-    typer.Option(
-        "--elevation",
-        help="Elevation raster (GeoTIFF) that gives the heights in place of the receiver.",
-        metavar="FILE.tif",
-    ),
-]
-SplitMb = Annotated[
-    Optional[float],  # noqa: UP045
-    typer.Option(
-        "--split-mb",
-        min=1.0,
-        help="Go on in a new folder where the recording has so many MB: trip, trip-2 and so on.",
-    ),
-]
-KeepDays = Annotated[
-    Optional[float],  # noqa: UP045
-    typer.Option(
-        "--keep-days",
-        min=1.0,
-        help="Remove folders of this recording that were last written so many days ago.",
-    ),
-]
+DrivePaths = Annotated[list[Path], argument("DRIVES")]
+OneDrive = Annotated[Path, argument("DRIVE")]
+JsonPath = Annotated[str | None, option("--json")]
+MappingPath = Annotated[Path | None, option("--mapping")]
+ReportPath = Annotated[Path | None, option("--report")]
+DbcPaths = Annotated[list[str] | None, option("--dbc")]
+Elevation = Annotated[Path | None, option("--elevation")]
+SplitMb = Annotated[float | None, option("--split-mb", min=1.0)]
+KeepDays = Annotated[float | None, option("--keep-days", min=1.0)]
 
-Units = Annotated[
-    str,
-    typer.Option(
-        "--units",
-        help="What people read: si, or us for pounds, feet and miles. Files stay SI.",
-        callback=show_in,
-        autocompletion=one_of(*SYSTEMS),
-    ),
-]
+Units = Annotated[str, option("--units", callback=show_in, autocompletion=one_of(*SYSTEMS))]
 
-Whole = Annotated[
-    bool,
-    typer.Option("--whole", help="Treat each recording as one drive; do not split it."),
-]
+Whole = Annotated[bool, option("--whole")]
 
 
 def chosen_mapping(vehicle: Vehicle | None, home: Path | None, asked: Path | None) -> Path | None:

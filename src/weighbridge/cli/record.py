@@ -10,11 +10,11 @@ import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from time import monotonic
-from typing import TYPE_CHECKING, Annotated, Final, Optional
+from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
-from weighbridge.cli.listed import source_kinds
+from weighbridge.cli.listed import option, source_kinds
 from weighbridge.cli.options import (
     DbcPaths,
     KeepDays,
@@ -41,40 +41,14 @@ _REPORTED: Final = 60.0
 
 
 def record(
-    source: Annotated[
-        list[str],
-        typer.Option(
-            "--source",
-            help="Source of samples; repeat it for more.",
-            autocompletion=source_kinds,
-            show_default=False,
-        ),
-    ],
-    output: Annotated[
-        Path, typer.Option("-o", "--output", help="Folder to record into.", show_default=False)
-    ],
-    vehicle: Annotated[
-        Optional[Path],  # noqa: UP045  (typer reads the annotation at run time)
-        typer.Option("--vehicle", help="Vehicle file, for the signals that it needs."),
-    ] = None,
+    source: Annotated[list[str], option("record --source", autocompletion=source_kinds)],
+    output: Annotated[Path, option("record --output")],
+    vehicle: Annotated[Path | None, option("record --vehicle")] = None,
     mapping: MappingPath = None,
     dbc: DbcPaths = None,
-    listen_only: Annotated[
-        bool,
-        typer.Option("--listen-only", help="Refuse sources that send requests to the vehicle."),
-    ] = False,
-    check: Annotated[
-        float,
-        typer.Option(
-            "--check", min=0.0, help="Time to wait for all signals in s; 0 does not wait."
-        ),
-    ] = 20.0,
-    duration: Annotated[
-        Optional[float],  # noqa: UP045
-        typer.Option(
-            "--duration", min=0.0, help="End after this time in s; otherwise end with Ctrl-C."
-        ),
-    ] = None,
+    listen_only: Annotated[bool, option("record --listen-only")] = False,
+    check: Annotated[float, option("record --check", min=0.0)] = 20.0,
+    duration: Annotated[float | None, option("record --duration", min=0.0)] = None,
     split_mb: SplitMb = None,
     keep_days: KeepDays = None,
 ) -> None:

@@ -5,11 +5,11 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Optional
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from weighbridge.cli.listed import paper_names
+from weighbridge.cli.listed import argument, option, paper_names
 from weighbridge.cli.progress import progress
 from weighbridge.cli.results import Kind, Result, asked_for, inputs, refuse_results, write_json
 from weighbridge.cli.terminal import complain, console, say
@@ -20,48 +20,11 @@ if TYPE_CHECKING:
 
 
 def reproduce(
-    paper: Annotated[
-        str,
-        typer.Argument(
-            help="du2025, galvao, jensen2022, nguyen2024 or all.", autocompletion=paper_names
-        ),
-    ] = "all",
-    report: Annotated[
-        Optional[Path],  # noqa: UP045  (typer reads the annotation at run time)
-        typer.Option(
-            "--report",
-            help="Write a report with the paper's figures from our data. With several papers, "
-            "each report has the paper's name before the suffix. As .md: a list of every "
-            "equation, table and figure, where it is in the code, and our figure of this "
-            "run.",
-        ),
-    ] = None,
-    seed: Annotated[
-        Optional[int],  # noqa: UP045
-        typer.Option(
-            "--seed",
-            min=0,
-            help="Seed of the simulated drives; by default the one chosen for the paper.",
-        ),
-    ] = None,
-    json_path: Annotated[
-        Optional[str],  # noqa: UP045
-        typer.Option(
-            "--json",
-            metavar="FILE",
-            help="Write every row to a file, or - for standard output: conditions, printed value, "
-            "ours, tolerance, verdict, reason.",
-        ),
-    ] = None,
-    changes: Annotated[
-        Optional[list[str]],  # noqa: UP045
-        typer.Option(
-            "--set",
-            help="Change a setting that the paper varies, such as printed.forgetting=0.998; "
-            "repeat it for more. For one paper only.",
-            metavar="NAME=VALUE",
-        ),
-    ] = None,
+    paper: Annotated[str, argument("reproduce PAPER", autocompletion=paper_names)] = "all",
+    report: Annotated[Path | None, option("reproduce --report")] = None,
+    seed: Annotated[int | None, option("reproduce --seed", min=0)] = None,
+    json_path: Annotated[str | None, option("reproduce --json")] = None,
+    changes: Annotated[list[str] | None, option("reproduce --set")] = None,
 ) -> None:
     """Reproduce a published system on simulated drives, and judge each printed value.
 

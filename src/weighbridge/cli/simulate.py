@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Optional
+from typing import Annotated
 
 import typer
 
 from weighbridge.cli.fleet import RunsDrives, Unnamed
-from weighbridge.cli.listed import FORMATS, effect_names, one_of, scenario_names
+from weighbridge.cli.listed import FORMATS, argument, effect_names, one_of, option, scenario_names
 from weighbridge.cli.progress import progress
 from weighbridge.cli.results import inputs, refuse_folder, refuse_overwriting
 from weighbridge.cli.terminal import say
@@ -18,59 +18,21 @@ app = typer.Typer(cls=RunsDrives, help="Simulate a drive, or the drives of a fle
 
 @app.command("run", cls=Unnamed, hidden=True)
 def simulate(
-    scenario: Annotated[
-        str,
-        typer.Argument(
-            help="car, car-calibration, car-short, car-loading, highway, compact, "
-            "compact-calibration, electric, bus, bus-urban, bus-calibration, diesel, "
-            "diesel-calibration, cvt, cvt-calibration, hybrid, hybrid-calibration, van, "
-            "van-calibration, truck, truck-calibration or ride; fleet has options of its own: "
-            "weighbridge simulate fleet --help.",
-            autocompletion=scenario_names,
-            show_default=False,
-        ),
-    ],
-    output: Annotated[
-        Path, typer.Option("-o", "--output", help="Folder to write.", show_default=False)
-    ],
-    mass: Annotated[
-        Optional[float],  # noqa: UP045  (typer reads the annotation at run time)
-        typer.Option("--mass", help="Mass at the start in kg; the empty car's by default."),
-    ] = None,
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of all random numbers.")] = 1,
-    wind: Annotated[
-        Optional[float],  # noqa: UP045
-        typer.Option("--wind", help="Mean wind at 10 m height in m/s."),
-    ] = None,
-    wind_from: Annotated[
-        Optional[float],  # noqa: UP045
-        typer.Option("--wind-from", help="Where wind comes from, degrees clockwise from north."),
-    ] = None,
+    scenario: Annotated[str, argument("simulate SCENARIO", autocompletion=scenario_names)],
+    output: Annotated[Path, option("simulate --output")],
+    mass: Annotated[float | None, option("simulate --mass")] = None,
+    seed: Annotated[int, option("--seed", min=0)] = 1,
+    wind: Annotated[float | None, option("simulate --wind")] = None,
+    wind_from: Annotated[float | None, option("simulate --wind-from")] = None,
     without: Annotated[
-        Optional[list[str]],  # noqa: UP045
-        typer.Option(
-            "--without",
-            help="Effect to switch off, such as squat; repeat it for more.",
-            autocompletion=effect_names,
-        ),
+        list[str] | None, option("simulate --without", autocompletion=effect_names)
     ] = None,
     road: Annotated[
-        Optional[str],  # noqa: UP045
-        typer.Option(
-            "--road",
-            help="For ride: ISO 8608 class A to H; C by default.",
-            autocompletion=one_of(*"ABCDEFGH"),
-        ),
+        str | None, option("simulate --road", autocompletion=one_of(*"ABCDEFGH"))
     ] = None,
-    speed: Annotated[
-        Optional[float],  # noqa: UP045
-        typer.Option("--speed", help="For ride: speed in km/h; 60 by default."),
-    ] = None,
-    table: Annotated[
-        str,
-        typer.Option("--format", help="Tables: csv or parquet.", autocompletion=one_of(*FORMATS)),
-    ] = "parquet",
-    force: Annotated[bool, typer.Option("--force", help="Write into an existing folder.")] = False,
+    speed: Annotated[float | None, option("simulate --speed")] = None,
+    table: Annotated[str, option("simulate --format", autocompletion=one_of(*FORMATS))] = "parquet",
+    force: Annotated[bool, option("simulate --force")] = False,
 ) -> None:
     """Simulate a drive and write it as a folder of tables, with the true values.
 
@@ -113,34 +75,15 @@ def simulate(
 
 @app.command()
 def fleet(
-    output: Annotated[
-        Path,
-        typer.Option(
-            "-o", "--output", help="Folder to write; it must not exist yet.", show_default=False
-        ),
-    ],
-    vehicles: Annotated[int, typer.Option("--vehicles", help="Number of vehicles.")] = 50,
-    days: Annotated[int, typer.Option("--days", help="Number of days.")] = 5,
-    drives: Annotated[
-        int, typer.Option("--drives", help="Number of drives per vehicle and day.")
-    ] = 4,
-    minutes: Annotated[
-        float, typer.Option("--minutes", help="Length of a drive in minutes.")
-    ] = 20.0,
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of all random numbers.")] = 1,
-    start: Annotated[str, typer.Option("--start", help="Date of the first day.")] = "2026-05-04",
-    drift: Annotated[
-        float,
-        typer.Option(
-            "--drift",
-            help="Drift of the torque reading of every third vehicle, from the first to the "
-            "last day, in %.",
-        ),
-    ] = 0.0,
-    workers: Annotated[
-        Optional[int],  # noqa: UP045
-        typer.Option("--workers", help="Processes; one per core by default."),
-    ] = None,
+    output: Annotated[Path, option("simulate fleet --output")],
+    vehicles: Annotated[int, option("simulate fleet --vehicles")] = 50,
+    days: Annotated[int, option("simulate fleet --days")] = 5,
+    drives: Annotated[int, option("simulate fleet --drives")] = 4,
+    minutes: Annotated[float, option("--minutes")] = 20.0,
+    seed: Annotated[int, option("--seed", min=0)] = 1,
+    start: Annotated[str, option("simulate fleet --start")] = "2026-05-04",
+    drift: Annotated[float, option("simulate fleet --drift")] = 0.0,
+    workers: Annotated[int | None, option("simulate fleet --workers")] = None,
 ) -> None:
     """Simulate days of trucks, vans, buses and cars: loads, overloads, trailers, broken sensors.
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Optional
 
 import typer
 
-from weighbridge.cli.listed import TellsSources, class_names, one_of, source_names
+from weighbridge.cli.listed import TellsSources, argument, class_names, one_of, option, source_names
 from weighbridge.cli.options import MappingPath
 from weighbridge.cli.results import Result, inputs, refuse_overwriting, refuse_results
 from weighbridge.cli.terminal import console, say, shown
@@ -22,114 +22,34 @@ app = typer.Typer(no_args_is_help=True, help="Write a vehicle file, or explain a
 _Text = Optional[str]  # noqa: UP045  (typer reads the annotation at run time)
 _Number = Optional[float]  # noqa: UP045
 
-_Tare = Annotated[
-    _Number,
-    typer.Option(
-        "--tare",
-        help="Mass without payload in kg; field G of an EU registration document.",
-        show_default=False,
-    ),
-]
-_Gross = Annotated[
-    _Number,
-    typer.Option("--gross", help="Permitted mass in kg, field F.1 or F.2.", show_default=False),
-]
-_Tyre = Annotated[
-    _Text, typer.Option("--tyre", help="Tyre size, such as '205/55 R16'.", show_default=False)
-]
-_Radius = Annotated[
-    _Number,
-    typer.Option(
-        "--radius",
-        help="Rolling radius of the driven wheels in m, instead of the tyre size.",
-        show_default=False,
-    ),
-]
-_DrivenAxles = Annotated[
-    _Text,
-    typer.Option(
-        "--driven",
-        help="Driven axles: front, rear or all.",
-        autocompletion=one_of("front", "rear", "all"),
-        show_default=False,
-    ),
-]
-_GearRatios = Annotated[
-    _Text,
-    typer.Option(
-        "--gear-ratios", help="Gear ratios, such as 3.77,2.09,1.32,0.98,0.78.", show_default=False
-    ),
-]
-_Torque = Annotated[
-    _Text,
-    typer.Option(
-        "--torque",
-        help="Torque source of the drives.",
-        autocompletion=source_names,
-        show_default=False,
-    ),
-]
-_Layout = Annotated[
-    _Text,
-    typer.Option(
-        "--layout",
-        help="Engine of a car or van: transverse or longitudinal.",
-        autocompletion=one_of("transverse", "longitudinal"),
-        show_default=False,
-    ),
-]
-
 
 @app.command(cls=TellsSources)
 def new(
-    output: Annotated[
-        Path, typer.Option("-o", "--output", help="Vehicle file to write.", show_default=False)
-    ],
-    kind: Annotated[
-        str,
-        typer.Option(
-            "--class",
-            help="car, hybrid, van, bus, truck, motorcycle, quad or racer.",
-            autocompletion=class_names,
-        ),
-    ] = "car",
-    name: Annotated[str, typer.Option("--name", help="Name shown in results.")] = "vehicle",
+    output: Annotated[Path, option("--output")],
+    kind: Annotated[str, option("vehicle --class", autocompletion=class_names)] = "car",
+    name: Annotated[str, option("vehicle --name")] = "vehicle",
     engine: Annotated[
-        _Text,
-        typer.Option(
-            "--engine",
-            help="petrol, diesel or electric.",
-            autocompletion=one_of("petrol", "diesel", "electric"),
-            show_default=False,
-        ),
+        str | None,
+        option("vehicle --engine", autocompletion=one_of("petrol", "diesel", "electric")),
     ] = None,
-    tare: _Tare = None,
-    gross: _Gross = None,
-    tyre: _Tyre = None,
-    radius: _Radius = None,
-    driven: _DrivenAxles = None,
-    gear_ratios: _GearRatios = None,
-    final_drive: Annotated[
-        _Number,
-        typer.Option("--final-drive", help="Final drive ratio of the axle.", show_default=False),
+    tare: Annotated[float | None, option("vehicle --tare")] = None,
+    gross: Annotated[float | None, option("vehicle --gross")] = None,
+    tyre: Annotated[str | None, option("vehicle --tyre")] = None,
+    radius: Annotated[float | None, option("vehicle --radius")] = None,
+    driven: Annotated[
+        str | None, option("vehicle --driven", autocompletion=one_of("front", "rear", "all"))
     ] = None,
-    torque: _Torque = None,
-    reference_torque: Annotated[
-        _Number,
-        typer.Option(
-            "--reference-torque", help="Torque in N m that 100 % means.", show_default=False
-        ),
+    gear_ratios: Annotated[str | None, option("vehicle --gear-ratios")] = None,
+    final_drive: Annotated[float | None, option("vehicle --final-drive")] = None,
+    torque: Annotated[str | None, option("--torque", autocompletion=source_names)] = None,
+    reference_torque: Annotated[float | None, option("vehicle --reference-torque")] = None,
+    drag_coefficient: Annotated[float | None, option("vehicle --drag-coefficient")] = None,
+    frontal_area: Annotated[float | None, option("vehicle --frontal-area")] = None,
+    layout: Annotated[
+        str | None, option("vehicle --layout", autocompletion=one_of("transverse", "longitudinal"))
     ] = None,
-    drag_coefficient: Annotated[
-        _Number,
-        typer.Option("--drag-coefficient", help="Drag coefficient C_d.", show_default=False),
-    ] = None,
-    frontal_area: Annotated[
-        _Number, typer.Option("--frontal-area", help="Frontal area in m².", show_default=False)
-    ] = None,
-    layout: _Layout = None,
     mapping: MappingPath = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
+    force: Annotated[bool, option("--force")] = False,
 ) -> None:
     """Write a vehicle file from what an owner knows; other values are usual ones of the class.
 
@@ -176,7 +96,7 @@ def new(
 
 @app.command()
 def show(
-    path: Annotated[Path, typer.Argument(help="Vehicle file.", show_default=False)],
+    path: Annotated[Path, argument("vehicle PATH")],
 ) -> None:
     """Explain in words what a vehicle file says, and how good it is.
 

@@ -13,6 +13,7 @@ from typing import Annotated, Any, Final
 import typer
 from typer.core import TyperGroup, TyperOption
 
+from weighbridge.cli.listed import option
 from weighbridge.cli.terminal import complain, say
 from weighbridge.customary import shown_in
 
@@ -58,23 +59,9 @@ def show_in(units: str) -> str:
     return units
 
 
-Quiet = Annotated[
-    bool,
-    typer.Option(
-        "--quiet", "-q", callback=_take_quiet, help="Print results and errors only, no progress."
-    ),
-]
+Quiet = Annotated[bool, option("--quiet", callback=_take_quiet)]
 Verbose = Annotated[
-    int,
-    typer.Option(
-        "--verbose",
-        "-v",
-        count=True,
-        callback=_take_verbose,
-        metavar="",
-        show_default=False,
-        help="Log each step to standard error; -vv logs more.",
-    ),
+    int, option("--verbose", count=True, callback=_take_verbose, metavar="", show_default=False)
 ]
 
 
@@ -83,11 +70,11 @@ class EveryCommand(TyperGroup):
 
     def __init__(self, **settings: Any) -> None:
         super().__init__(**settings)
-        shared = [option for option in self.params if option.name in _SHARED]
+        shared = [given for given in self.params if given.name in _SHARED]
         for command in _leaves(self.commands.values()):
             command.help = _unbroken(command.help or "")
-            for option in shared:
-                own = copy.copy(option)
+            for given in shared:
+                own = copy.copy(given)
                 assert isinstance(own, TyperOption)
                 own.expose_value = False
                 command.params.append(own)

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Optional
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from weighbridge.cli.listed import method_names
+from weighbridge.cli.listed import method_names, option
 from weighbridge.cli.options import (
     DbcPaths,
     DrivePaths,
@@ -52,63 +52,16 @@ _REPORTING = 0.3
 _NOTED = 3
 
 
-_VehiclePath = Annotated[
-    Path,
-    typer.Option(
-        "--vehicle", help="Vehicle file, written by calibrate or vehicle new.", show_default=False
-    ),
-]
-_Method = Annotated[str, typer.Option("--method", help="Estimator.", autocompletion=method_names)]
-_Changes = Annotated[
-    Optional[list[str]],  # noqa: UP045
-    typer.Option(
-        "--set",
-        help="Change a setting of the estimator, such as forgetting=0.999; repeat it for more.",
-        metavar="NAME=VALUE",
-    ),
-]
-_Json = Annotated[
-    Optional[str],  # noqa: UP045
-    typer.Option(
-        "--json", help="Write one JSON object per drive to a file, or - for standard output."
-    ),
-]
-_Track = Annotated[
-    Optional[Path],  # noqa: UP045
-    typer.Option(
-        "--track",
-        help="Write the mass over time as .csv or .parquet; as .mcap or .mf4 beside the signals "
-        "of the drive. For one drive only.",
-    ),
-]
-_Compare = Annotated[
-    bool,
-    typer.Option(
-        "--compare",
-        help="Weigh with every method; show all results side by side, also in the report.",
-    ),
-]
-_Tiles = Annotated[
-    Optional[str],  # noqa: UP045
-    typer.Option(
-        "--tiles",
-        help="Draw the maps of the report over tiles of this address, with {z}, {x} and {y}; the "
-        "page then asks that server.",
-        metavar="URL",
-    ),
-]
-
-
 def weigh(
     drives: DrivePaths,
-    vehicle: _VehiclePath,
-    method: _Method = "joint",
-    changes: _Changes = None,
-    json_path: _Json = None,
-    track: _Track = None,
+    vehicle: Annotated[Path, option("--vehicle")],
+    method: Annotated[str, option("--method", autocompletion=method_names)] = "joint",
+    changes: Annotated[list[str] | None, option("weigh --set")] = None,
+    json_path: Annotated[str | None, option("weigh --json")] = None,
+    track: Annotated[Path | None, option("weigh --track")] = None,
     report: ReportPath = None,
-    compare: _Compare = False,
-    tiles: _Tiles = None,
+    compare: Annotated[bool, option("weigh --compare")] = False,
+    tiles: Annotated[str | None, option("weigh --tiles")] = None,
     units: Units = "si",
     whole: Whole = False,
     mapping: MappingPath = None,
