@@ -8,6 +8,7 @@ from typing import Any, Final
 import polars as pl
 
 from weighbridge.errors import ConfigError
+from weighbridge.fleet.schema import TAUGHT
 from weighbridge.io import PARSE_ERRORS, first_line, quietly
 
 LEARNT: Final = "learnt.parquet"
@@ -16,35 +17,8 @@ LEARNT: Final = "learnt.parquet"
 SURE: Final = 3.0
 """A drift is reported where it is so many standard deviations [-]."""
 
-COLUMNS: Final[dict[str, Any]] = {
-    "vehicle_id": pl.String,
-    "drives": pl.Int32,
-    "weighed": pl.Int32,
-    "error_pct": pl.Float64,
-    "error_std_pct": pl.Float64,
-    "contradicted": pl.Boolean,
-    "torque_drift_pct": pl.Float64,
-    "torque_drift_std_pct": pl.Float64,
-    "rolling_drift": pl.Float64,
-    "rolling_drift_std": pl.Float64,
-    "pitch_drift_deg": pl.Float64,
-    "pitch_drift_std_deg": pl.Float64,
-    "refined": pl.String,
-    "findings": pl.String,
-    "vehicle_digest": pl.String,
-    "type": pl.String,
-    "factor": pl.Float64,
-    "factor_std": pl.Float64,
-    "factor_common_std": pl.Float64,
-    "factor_legs": pl.Int32,
-    "factor_reason_id": pl.String,
-    "factor_reason": pl.String,
-}
-"""Columns of what was learnt of a vehicle: drives with a ticket, those with a mass, how far these
-are from their tickets in the mean (positive: too heavy) and how far they may be; drifts per 30
-days; name of the refined file, and sentences. Then what the fleet showed of its scale: digest of
-the vehicle file that the drives were weighed with, type, true over weighed mass with its standard
-deviation and the part that its type shares [-], legs with a mass, and why it is so."""
+COLUMNS: Final[dict[str, Any]] = {name: column.type for name, column in TAUGHT.items()}
+"""Columns of the table."""
 
 EARLIER: Final = "told"
 """Name of the findings in a table of earlier versions."""
