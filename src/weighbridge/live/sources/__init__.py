@@ -1,4 +1,4 @@
-"""Every kind of source, one record each: the only place that lists them.
+"""Every kind of source, one record each; `kinds.toml` lists them.
 
 A package of its own adds a kind by an entry point of the group ``weighbridge.sources`` that
 names a `weighbridge.live.sources.kind.SourceKind`.
@@ -6,90 +6,34 @@ names a `weighbridge.live.sources.kind.SourceKind`.
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Sequence
-from typing import Final
+from importlib.resources import files
+from typing import Any, Final
 
 from weighbridge.arguments import near_miss
 from weighbridge.errors import ConfigError
+from weighbridge.first_use import at_first_call
 from weighbridge.io.dbc import DbcSource
 from weighbridge.io.mapping import MappingSource
 from weighbridge.live.source import Source
-from weighbridge.live.sources import canbus, elm, gpsd, iio, lines, nmea, obd, ubx
 from weighbridge.live.sources.kind import SourceKind, SourceOptions
 from weighbridge.registry import Registry
 
 GROUP: Final = "weighbridge.sources"
 """Entry points by which packages add kinds of sources."""
 
+
+def _kind(name: str, *, make: str, **others: Any) -> SourceKind:
+    return SourceKind(name=name, make=at_first_call(f"{__name__}.{make}"), **others)
+
+
+_LISTED: Final = tomllib.loads(
+    files("weighbridge.live.sources").joinpath("kinds.toml").read_text(encoding="utf-8")
+)
+
 SOURCES: Final[Registry[SourceKind]] = Registry(
-    SourceKind,
-    GROUP,
-    (
-        SourceKind(
-            name="can",
-            form="can:INTERFACE:CHANNEL[@BITRATE]",
-            about="listens to a CAN bus and reads the signals of a DBC, and answers of OBD-II "
-            "that another device asks for",
-            make=canbus.make_can,
-            package="python-can",
-        ),
-        SourceKind(
-            name="j1939",
-            form="j1939:INTERFACE:CHANNEL[@BITRATE]",
-            about="listens to the CAN bus of a truck or bus (SAE J1939) and sends nothing",
-            make=canbus.make_j1939,
-            package="python-can",
-        ),
-        SourceKind(
-            name="obd",
-            form="obd:INTERFACE:CHANNEL[@BITRATE]",
-            about="asks a car for OBD-II values over a CAN interface",
-            make=obd.make_obd,
-            asks=True,
-            package="can-isotp",
-        ),
-        SourceKind(
-            name="elm",
-            form="elm:PATH[@BAUD], elm:tcp:HOST:PORT or elm:ble:ADDRESS",
-            about="asks a car for OBD-II values by an ELM327 adapter on USB, Wi-Fi or Bluetooth",
-            make=elm.make_elm,
-            asks=True,
-            package="serialx",
-        ),
-        SourceKind(
-            name="gpsd",
-            form="gpsd:HOST:PORT",
-            about="takes position, speed and course from gpsd",
-            make=gpsd.make_gpsd,
-        ),
-        SourceKind(
-            name="nmea",
-            form="nmea:PATH[@BAUD] or nmea:tcp:HOST:PORT",
-            about="takes position, speed and course from a GNSS receiver that sends NMEA 0183",
-            make=nmea.make_nmea,
-            package="serialx",
-        ),
-        SourceKind(
-            name="ubx",
-            form="ubx:PATH[@BAUD] or ubx:tcp:HOST:PORT",
-            about="takes position and velocity from a GNSS receiver of u-blox that sends UBX, "
-            "NMEA 0183 or both",
-            make=ubx.make_ubx,
-            package="pyubx2",
-        ),
-        SourceKind(
-            name="lines",
-            form="lines:- or lines:udp:[HOST:]PORT",
-            about="takes JSON lines of any signal from standard input or by UDP",
-            make=lines.make_lines,
-        ),
-        SourceKind(
-            name="iio",
-            form="iio:NAME[@RATE]",
-            about="reads an accelerometer and a gyro of Linux' industrial I/O",
-            make=iio.make_iio,
-        ),
-    ),
+    SourceKind, GROUP, tuple(_kind(name, **record) for name, record in _LISTED.items())
 )
 """Kinds of sources by name."""
 
