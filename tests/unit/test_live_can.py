@@ -160,8 +160,6 @@ def test_interface_that_no_one_knows():
 
 @pytest.mark.parametrize("text", ["can:virtual:{}", "j1939:virtual:{}", "obd:virtual:{}"])
 def test_stop_ends_a_source_within_a_second(text, request):
-    if text.startswith("obd"):
-        pytest.importorskip("isotp")
     stop = Event()
     source = parse_source(text.format(request.node.name))
     thread = Thread(target=source.run, args=(lambda _: None, stop), daemon=True)

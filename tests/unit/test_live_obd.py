@@ -14,8 +14,6 @@ from weighbridge.live import Feed, parse_source
 from weighbridge.live.sources import schedule as schedule_module
 from weighbridge.live.sources.schedule import Request, Schedule, Vigil, packed, supported_of
 
-pytest.importorskip("isotp")
-
 CAR = {
     0x04: b"\x80",
     0x0B: b"\x40",
