@@ -290,7 +290,7 @@ class Run:
         recorder = Recordings(folder / "trip", clock=clock.monotonic, date=world.date)
         sources = [
             ElmSource("elm:/dev/ttyUSB0", (world.adapter,)),
-            ReceiverSource("nmea:/dev/ttyACM0", world.receiver, SentenceReader, "NMEA sentence"),
+            ReceiverSource("nmea:/dev/ttyACM0", world.receiver, SentenceReader, "no fix"),
             LinesSource("lines:udp:5005", world.datagrams),
         ]
         broker = parse_broker("mqtt://broker:1883/fleet")

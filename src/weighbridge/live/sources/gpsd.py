@@ -5,27 +5,18 @@ from __future__ import annotations
 import datetime as dt
 import json
 import math
-from collections.abc import Callable, Mapping
-from threading import Event
-from time import monotonic
+from collections.abc import Mapping
 from typing import Any, Final
 
-from weighbridge.errors import ConfigError
-from weighbridge.live.clock import now
 from weighbridge.live.device_clock import DeviceClock
-from weighbridge.live.source import Samples
-from weighbridge.live.sources.gathered import BLOCK, Gathered
-from weighbridge.live.sources.kind import SourceOptions, checked_port
-from weighbridge.live.sources.links import TcpLink
+from weighbridge.live.sources.kind import SourceOptions
+from weighbridge.live.sources.links import Link, tcp
+from weighbridge.live.sources.receiver import ReceiverSource
 
 PORT: Final = 2947
 """Port that gpsd listens on."""
 
-SILENT: Final = 5.0
-"""Without a fix for so long there is a trouble [s]."""
-
 _WATCH: Final = b'?WATCH={"enable":true,"json":true};\n'
-_SLICE: Final = 0.1
 _MOST_TEXT: Final = 65_536
 
 # A report of class TPV: its fields, and what they are (gpsd_json(5)); heights above the sea first.
@@ -40,7 +31,7 @@ _FIELDS: Final = (
 _FIX_2D, _FIX_3D = 2, 3
 
 
-def make_gpsd(text: str, options: SourceOptions) -> GpsdSource:
+def make_gpsd(text: str, options: SourceOptions) -> ReceiverSource:
     """Make a source of gpsd; see `weighbridge.live.sources.kind.SourceKind`.
 
     Raises
@@ -48,57 +39,42 @@ def make_gpsd(text: str, options: SourceOptions) -> GpsdSource:
     ConfigError
         The place cannot be used.
     """
-    host, _, port = text.rpartition(":")
-    if not host:
-        raise ConfigError(f"source 'gpsd:{text}' names no host; write gpsd:localhost:{PORT}")
-    return GpsdSource(f"gpsd:{text}", host, checked_port(port, f"gpsd:{text}"))
+    name = f"gpsd:{text}"
+    connected = tcp(name, text, f"gpsd:localhost:{PORT}")
+
+    def watching() -> Link:
+        link = connected()
+        link.write(_WATCH)
+        return link
+
+    no_fix = "gpsd has no fix; is a receiver connected, with a view of the sky?"
+    return ReceiverSource(name, watching, ReportReader, no_fix, shared=True)
 
 
-class GpsdSource:
-    """Listens to gpsd.
+class ReportReader:
+    """Finds reports of a fix among the lines of gpsd."""
 
-    Parameters
-    ----------
-    name : as on the command line
-    host, port : where gpsd listens
-    """
+    def __init__(self) -> None:
+        self._text = b""
+        self._clock = DeviceClock()
 
-    def __init__(self, name: str, host: str, port: int) -> None:
-        self.name = name
-        self.trouble = ""
-        self._host = host
-        self._port = port
+    def read(self, data: bytes, arrived: float) -> list[tuple[float, dict[str, float]]]:
+        """Return instants [s] and values [SI] of the lines that are whole now.
 
-    def run(self, put: Callable[[Samples], None], stop: Event) -> None:
-        """Hand over fixes until asked to stop; see `weighbridge.live.source.Source.run`."""
-        self.trouble = ""
-        link = TcpLink(self._host, self._port)
-        gathered = Gathered(put)
-        clock = DeviceClock()
-        text = b""
-        fixed = monotonic()
-        try:
-            link.write(_WATCH)
-            while not stop.is_set():
-                *lines, text = (text + link.read(_SLICE)).split(b"\n")
-                text = text[-_MOST_TEXT:]
-                for line in lines:
-                    stamp, values = read_report(line)
-                    if "latitude" in values:
-                        fixed, self.trouble = monotonic(), ""
-                    if values:
-                        arrived = now()
-                        known = math.isfinite(stamp)
-                        gathered.add(clock.host(stamp, arrived) if known else arrived, values)
-                gathered.flush(BLOCK)
-                if monotonic() - fixed > SILENT:
-                    self.trouble = (
-                        "gpsd has no fix; is a receiver connected, with a view of the sky?"
-                    )
-            gathered.flush()
-        finally:
-            self.trouble = ""
-            link.close()
+        Parameters
+        ----------
+        data : what came
+        arrived : when, by the host's clock [s]
+        """
+        *lines, rest = (self._text + data).split(b"\n")
+        self._text = rest[-_MOST_TEXT:]
+        rows = []
+        for line in lines:
+            stamp, values = read_report(line)
+            if values:
+                known = math.isfinite(stamp)
+                rows.append((self._clock.host(stamp, arrived) if known else arrived, values))
+        return rows
 
 
 def read_report(line: bytes) -> tuple[float, dict[str, float]]:

@@ -29,7 +29,8 @@ def make_nmea(text: str, options: SourceOptions) -> ReceiverSource:
         The place cannot be used.
     """
     open_link = serial_or_tcp("nmea", text, BAUD)
-    return ReceiverSource(f"nmea:{text}", open_link, SentenceReader, "NMEA sentence such as RMC")
+    no_fix = "the receiver has no fix, or sends no NMEA sentence such as RMC"
+    return ReceiverSource(f"nmea:{text}", open_link, SentenceReader, no_fix)
 
 
 class SentenceReader:

@@ -1,8 +1,9 @@
-"""GNSS receivers that send by themselves, on a serial line or over TCP."""
+"""GNSS receivers that send by themselves, on a serial line, over TCP or by gpsd."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import nullcontext
 from threading import Event
 from time import monotonic
 from typing import Final, Protocol
@@ -41,7 +42,8 @@ class ReceiverSource:
     name : as on the command line
     open_link : opens the way to it
     make_reader : makes what reads its bytes
-    sends : what it should send, for messages
+    no_fix : why no fix may come, one sentence
+    shared : others may listen to it as well, as to gpsd
     """
 
     def __init__(
@@ -49,18 +51,21 @@ class ReceiverSource:
         name: str,
         open_link: Callable[[], Link],
         make_reader: Callable[[], FixReader],
-        sends: str,
+        no_fix: str,
+        *,
+        shared: bool = False,
     ) -> None:
         self.name = name
         self.trouble = ""
         self._open = open_link
         self._make_reader = make_reader
-        self._sends = sends
+        self._no_fix = no_fix
+        self._shared = shared
 
     def run(self, put: Callable[[Samples], None], stop: Event) -> None:
         """Hand over fixes until asked to stop; see `weighbridge.live.source.Source.run`."""
         self.trouble = ""
-        with DeviceLock(self.name):
+        with nullcontext() if self._shared else DeviceLock(self.name):
             link = self._open()
             try:
                 self._listen(link, put, stop)
@@ -78,11 +83,15 @@ class ReceiverSource:
             if data:
                 heard = monotonic()
             for time, values in reader.read(data, now()):
-                fixed, self.trouble = monotonic(), ""
+                # The geometry of the satellites is known without a fix.
+                if values.keys() != {"hdop"}:
+                    fixed, self.trouble = monotonic(), ""
                 gathered.add(time, values)
             gathered.flush(BLOCK)
-            if monotonic() - heard > SILENT:
-                self.trouble = f"the receiver sent nothing for {SILENT:g} s; check cable and rate"
-            elif monotonic() - fixed > SILENT:
-                self.trouble = f"the receiver has no fix, or sends no {self._sends}"
+            if monotonic() - fixed > SILENT:
+                self.trouble = self._no_fix
+                if monotonic() - heard > SILENT and not self._shared:
+                    self.trouble = (
+                        f"the receiver sent nothing for {SILENT:g} s; check cable and rate"
+                    )
         gathered.flush()

@@ -36,9 +36,8 @@ def make_ubx(text: str, options: SourceOptions) -> ReceiverSource:
         The place cannot be used.
     """
     open_link = serial_or_tcp("ubx", text, BAUD)
-    return ReceiverSource(
-        f"ubx:{text}", open_link, UbxReader, "UBX message NAV-PVT and no NMEA sentence"
-    )
+    no_fix = "the receiver has no fix, or sends no UBX message NAV-PVT and no NMEA sentence"
+    return ReceiverSource(f"ubx:{text}", open_link, UbxReader, no_fix)
 
 
 class UbxReader:
