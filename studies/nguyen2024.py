@@ -73,7 +73,7 @@ def experiment() -> tuple[str, str]:
          "later than 0.3 s after a change"),
         rows,
     )  # fmt: skip
-    best = results[paper.PAPERS_CASE.name]
+    best = results[paper.cases.PAPERS_CASE.name]
     rows = []
     for label, name, theirs, scale, form in (
         ("RMSE kg, kg m²", "rmse", paper.PAPER_RMSE, 1.0, ".0f"),
@@ -91,7 +91,7 @@ def experiment() -> tuple[str, str]:
 
 def fixed_noise() -> str:
     """Scan the fixed process noise of the filters without jumps."""
-    made = [paper.simulate(FIRST_SEED + k, paper.PAPERS_SENSORS) for k in range(5)]
+    made = [paper.simulate(FIRST_SEED + k, paper.cases.PAPERS_SENSORS) for k in range(5)]
     rows = []
     for method in ("inverse", "extended"):
         for density in (1e-4, 1e-3, 1e-2, 1e-1, 1.0):
@@ -119,7 +119,7 @@ def bounds() -> str:
     velocities at that moment.
     """
     rows = []
-    for case in (paper.PAPERS_CASE, paper.AS_VARIANCE, paper.ORDINARY_SENSORS):
+    for case in (paper.cases.PAPERS_CASE, paper.cases.AS_VARIANCE, paper.cases.ORDINARY_SENSORS):
         sensors = case.sensors
         ride = paper.suspension_of(TRUCK, sensors)
         body, push, step = body_noise(ride), np.sqrt(push_var(ride)), 1.0 / sensors.rate
@@ -131,7 +131,7 @@ def bounds() -> str:
             force = -np.hstack((made.inputs[:, :4] * stiffness(ride),
                                 made.inputs[:, 4:] * damping(ride)))  # fmt: skip
             accel = force @ np.vstack((corners(ride), corners(ride))) / made.inertias
-            for at, factor in paper.CHANGES:
+            for at, factor in paper.cases.CHANGES:
                 first = np.searchsorted(made.time, at - 0.5 * step)
                 after = cumulative_trapezoid(accel[first : first + count + 1], dx=step, axis=0)
                 for j in range(3):

@@ -235,7 +235,7 @@ def fresh_jensen2022():
 
 
 def fresh_nguyen2024():
-    case = nguyen2024.EXTENDED
+    case = nguyen2024.cases.EXTENDED
     roads = nguyen2024.reproduce(cases=(case,))[0][case.name]
     return {f"{name} extended": f for name, f in nguyen2024.followed(roads).items()}
 

@@ -138,7 +138,7 @@ def claimed(judged, **other):
     """Say what the claims become of drives whose printed runs told something else."""
     drives = tuple(replace(judged, load=load, **other) for load in du2025.LOADS)
     made = du2025.Reproduction(drives=drives, road=(), sheet=(), vehicle=du2025.known_bus())
-    return {c.code: c.judge(made, "l1") for c in du2025.CLAIMS}
+    return {name: judge(made, "l1") for name, judge in du2025.JUDGES.items()}
 
 
 def test_each_sentence_of_the_text_is_judged_by_the_printed_runs(judged):

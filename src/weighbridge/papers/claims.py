@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import string
+import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from enum import StrEnum
+from importlib.resources import files
+from string import Template
 from typing import Any, Final
 
 import numpy as np
@@ -184,6 +187,44 @@ class Row:
             self.item, self.what, self.conditions, self.printed, self.ours, self.tolerance,
             self.verdict, listed(self.why, check), self.where,
         )  # fmt: skip
+
+
+def read_rows(paper: str, **values: str) -> dict[str, list[dict[str, str]]]:
+    """Return the rows of a paper's table by its sections; the fields are those of `Item`.
+
+    Parameters
+    ----------
+    paper : its table is ``PAPER.toml`` in this folder. ``$name`` in a text is one of its words; a
+        row with several items is one for each
+    values : further words
+    """
+    text = files("weighbridge.papers").joinpath(f"{paper}.toml").read_text(encoding="utf-8")
+    table = tomllib.loads(text)
+    words = {"exact": EXACT, **values}
+    for name, word in table.pop("words").items():
+        words[name] = Template(word).substitute(words)
+    found: dict[str, list[dict[str, str]]] = {section: [] for section in table}
+    for section, rows in table.items():
+        for row in rows:
+            items = row.get("item")
+            each = [row | {"item": item} for item in items] if isinstance(items, list) else [row]
+            found[section] += [
+                {key: Template(text).substitute(words) for key, text in one.items()} for one in each
+            ]
+    return found
+
+
+def items_of(rows: Iterable[Mapping[str, str]]) -> tuple[Item, ...]:
+    """Return the items of rows; an equation agrees to rounding with its figure, unless stated."""
+    items = []
+    for row in rows:
+        fields: dict[str, Any] = dict(row)
+        if row["item"].startswith("eq. "):
+            figure = "{" + row["item"].replace(".", "") + "}"
+            fields = {"ours": figure, "tolerance": EXACT} | fields
+        conditions = Conditions(fields.pop("conditions", Conditions.PRINTED))
+        items.append(Item(conditions=conditions, **fields))
+    return tuple(items)
 
 
 def same(

@@ -22,7 +22,7 @@ from weighbridge.estimators.hybrid import Blend, HybridSettings
 from weighbridge.kernels.hybrid_mass import share_at
 from weighbridge.papers.claims import Found, same
 from weighbridge.papers.du2025_bus import LOADS, data_sheet, known_bus, simulate
-from weighbridge.papers.du2025_claims import CLAIMS, work
+from weighbridge.papers.du2025_claims import JUDGES, work
 from weighbridge.papers.du2025_equations import equations
 from weighbridge.papers.du2025_items import ITEMS
 from weighbridge.papers.du2025_methods import (
@@ -302,8 +302,8 @@ def figures(done: Reproduction) -> dict[str, Found]:
             found[f"time {m} {load}"] = Found(f"{seconds:.3f} s", seconds <= time_)
     for number, load in zip((5, 6, 7), LOADS, strict=True):
         found[f"fig {number}"] = read(partial(_worst, done, load=load))
-    for claim in CLAIMS:
-        found[claim.code] = read(partial(claim.judge, done))
+    for name, judge in JUDGES.items():
+        found[name] = read(partial(judge, done))
     found["work"] = Found(*work(done.drives))
     found |= our_rmse(done.drives, "ours") | our_rmse(done.road, "road")
     return found | _blended(done) | _given()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 from typing import Final
 
@@ -25,33 +24,6 @@ APPROXIMATELY: Final = 0.35
 
 Judge = Callable[[Reproduction, str], tuple[str, bool]]
 """Of all drives and the code of a `Form`: our figure, and whether the claim holds on them."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TextClaim:
-    """One sentence of the paper that a run can contradict.
-
-    Attributes
-    ----------
-    code : name of its figure
-    section : where the paper says it
-    what : of what
-    printed : what it says
-    judge : what our drives say
-    tolerance : up to what difference it holds, and why
-    departure : what differs, besides the simulator and the tyres
-    check, seen : as of `weighbridge.papers.claims.Item`, where no reading of print agrees
-    """
-
-    code: str
-    section: str
-    what: str
-    printed: str
-    judge: Judge
-    tolerance: str
-    departure: str = ""
-    check: str = ""
-    seen: str = ""
 
 
 def _running(done: Reproduction, form: str, method: str, load: str = "") -> list[RunningError]:
@@ -168,132 +140,27 @@ def _largest(done: Reproduction, form: str) -> tuple[str, bool]:
     return f"{100.0 * most:.1f} %", most < BAND
 
 
-_ORDER: Final = "none: the order is the claim"
-_BOUND: Final = "none: the bound is printed"
-_DOUBLE: Final = "twice as far: what a reader sees in a drawing"
-_HALF: Final = "0.5 % of the mass: what a reader does not see in a drawing"
-_TWICE: Final = "35 % of 2.7 and 2.3 times: so far is the paper's 2.7 from its approximately twice"
-_MUCH: Final = "1.5 times: the paper says much"
-
-
-def _better(load: str, section: str) -> TextClaim:
-    least, kalman, blend = PAPER_RMSE[load]
-    return TextClaim(
-        code=f"blend {load}",
-        section=f"sec. {section}",
-        what=f"RMSE of the hybrid, {load}",
-        printed=f"{blend:.0f} of {least:.0f} and {kalman:.0f} kg: better than both",
-        judge=partial(_blend, load=load),
-        tolerance=_ORDER,
-    )
-
-
-_SPLIT: Final = "from the first mass, all loads; h(v) is only drawn: its limit is ours"
-_THEIRS: Final = "it starts from theirs; sec. 3.3 says the contrary of sec. 4.2"
-_BRAKED: Final = "farthest that the running mass moves in 20 s after the brakings at 115 and 147 s"
-
-CLAIMS: Final = (
-    TextClaim(
-        code="slow", tolerance=_ORDER, section="sec. 3.3",
-        what="RMSE below 40 km/h",
-        printed="least squares better",
-        judge=partial(_by_speed, name="slow", better=LEAST), departure=_SPLIT,
-    ),
-    TextClaim(
-        code="fast", tolerance=_ORDER, section="sec. 3.3",
-        what="RMSE above 40 km/h",
-        printed="Kalman filter better",
-        judge=partial(_by_speed, name="fast", better=KALMAN), departure=_SPLIT,
-    ),
-    TextClaim(
-        code="blending", tolerance=_ORDER, section="sec. 3.3",
-        what="RMSE of the hybrid below 40 km/h, where h(v) blends",
-        printed="better than both", judge=_blending,
-        departure="errors of one sign: a blend lies between them, in each reading of print",
-        check="weighbridge reproduce du2025", seen="this row",
-    ),
-    TextClaim(
-        code="first", tolerance=_BOUND, section="sec. 4.2",
-        what="first masses of the least squares, no-load",
-        printed="more than 10 % off", judge=_first, departure="the first one",
-    ),
-    TextClaim(
-        code="steady", tolerance=_BOUND, section="sec. 4.2",
-        what="least squares within 10 % from, no-load",
-        printed="21 s",
-        judge=_steady, departure="braking at 12 s; the paper gives no time",
-    ),
-    TextClaim(
-        code="sooner", tolerance=_ORDER, section="sec. 4.2",
-        what="Kalman filter within 10 %, no-load",
-        printed="sooner than the least squares",
-        judge=partial(_sooner, load=EMPTY, factor=1.0), departure=_THEIRS,
-    ),
-    TextClaim(
-        code="braked", tolerance=_DOUBLE, section="sec. 4.2",
-        what="brakings move the least squares, no-load",
-        printed="fluctuate, the Kalman filter does not",
-        judge=partial(_brakings, load=EMPTY), departure=_BRAKED,
-    ),
-    TextClaim(
-        code="unmoved", tolerance=_HALF, section="sec. 4.2",
-        what="brakings and the Kalman filter, no-load",
-        printed="not affected", judge=_unmoved, departure=_BRAKED,
-    ),
-    _better(EMPTY, "4.2"),
-    TextClaim(
-        code="loads", tolerance=_ORDER, section="sec. 4.2",
-        what="RMSE of the hybrid by load",
-        printed=" / ".join(f"{PAPER_RMSE[load][-1]:.0f}" for load in LOADS)
-        + " kg, the highest without load", judge=_loads,
-    ),
-    TextClaim(
-        code="sooner_half", tolerance=_ORDER, section="sec. 4.3",
-        what="Kalman filter within 10 %, half-load",
-        printed="sooner than the least squares",
-        judge=partial(_sooner, load=HALF, factor=1.0), departure="it starts from theirs",
-    ),
-    TextClaim(
-        code="braked_half", tolerance=_DOUBLE, section="sec. 4.3",
-        what="brakings move the least squares, half-load",
-        printed="much more than the Kalman filter",
-        judge=partial(_brakings, load=HALF), departure=_BRAKED,
-    ),
-    TextClaim(
-        code="grows", tolerance=_ORDER, section="sec. 4.3",
-        what="error of the least squares later on, half-load",
-        printed="gradually increases", judge=_grows,
-        departure="mean absolute error of the first and of the last 40 s after 21 s",
-    ),
-    _better(HALF, "4.3"),
-    TextClaim(
-        code="twice", tolerance=_TWICE, section="sec. 4.3",
-        what="RMSE of the hybrid without and at full load over half load",
-        printed="2.7 and 2.3 times, approximately twice", judge=_twice,
-        departure="a rolling coefficient that is too low errs in proportion to the mass; with one "
-        "that fits, the loads are alike",
-        check="weighbridge reproduce du2025 --set printed.ekf.start.rolling_coefficient=0.005",
-        seen="this row, 1.1 and 1.0 times",
-    ),
-    TextClaim(
-        code="slower_full", tolerance=_MUCH, section="sec. 4.4",
-        what="Kalman filter within 10 %, full-load",
-        printed="much sooner than the least squares",
-        judge=partial(_sooner, load=FULL, factor=1.5), departure="it starts from theirs",
-    ),
-    TextClaim(
-        code="steadier", tolerance=_ORDER, section="sec. 4.4",
-        what="Kalman filter against least squares, full-load",
-        printed="275 of 718 kg; more accurate and more stable", judge=_steadier,
-    ),
-    _better(FULL, "4.4"),
-    TextClaim(
-        code="largest", tolerance=_BOUND, section="sec. 5",
-        what="largest error of the hybrid after convergence",
-        printed="below 10 %", judge=_largest,
-    ),
-)  # fmt: skip
-"""In the paper's order; all by the settings as printed."""
+JUDGES: Final[dict[str, Judge]] = {
+    "slow": partial(_by_speed, name="slow", better=LEAST),
+    "fast": partial(_by_speed, name="fast", better=KALMAN),
+    "blending": _blending,
+    "first": _first,
+    "steady": _steady,
+    "sooner": partial(_sooner, load=EMPTY, factor=1.0),
+    "braked": partial(_brakings, load=EMPTY),
+    "unmoved": _unmoved,
+    "loads": _loads,
+    "sooner_half": partial(_sooner, load=HALF, factor=1.0),
+    "braked_half": partial(_brakings, load=HALF),
+    "grows": _grows,
+    "twice": _twice,
+    "slower_full": partial(_sooner, load=FULL, factor=1.5),
+    "steadier": _steadier,
+    "largest": _largest,
+    **{f"blend {load}": partial(_blend, load=load) for load in LOADS},
+}
+"""What our drives say to each sentence of the text that a run can contradict, by the name of its
+figure; all by the settings as printed."""
 
 
 def mean_seconds(drives: tuple[DriveResult, ...]) -> Floats:

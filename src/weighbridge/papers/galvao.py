@@ -23,6 +23,7 @@ from weighbridge.estimators.speed_ekf import (
     run_filter,
 )
 from weighbridge.estimators.speed_torque_ekf import SpeedTorqueSettings
+from weighbridge.papers.claims import items_of, read_rows
 from weighbridge.papers.galvao_bounds import speed_says, speed_table
 from weighbridge.papers.galvao_drives import (
     CAR,
@@ -33,7 +34,6 @@ from weighbridge.papers.galvao_drives import (
     with_grade,
 )
 from weighbridge.papers.galvao_figures import PAPER_BANDS, item_figures
-from weighbridge.papers.galvao_items import ITEMS as ITEMS
 from weighbridge.papers.galvao_results import Reproduction, Test, Trial
 from weighbridge.papers.galvao_statistics import rank_correlation, slope
 from weighbridge.papers.galvao_torque import (
@@ -108,6 +108,9 @@ class Settings:
             sampling=self.sampling,
         )
 
+
+ITEMS: Final = items_of(read_rows("galvao")["items"])
+"""In the paper's order; what is not the paper's is in the tables of the report."""
 
 SEED: Final = 196_200
 """Of the road and the first drive; nothing was chosen on them and those after them."""

@@ -10,17 +10,23 @@ weighbridge has it, with its own navigation and calibration.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Final
 
+from weighbridge.papers.claims import Item, items_of, listed, read_rows
 from weighbridge.papers.jensen2022_drives import TABLE_B1, scenario
 from weighbridge.papers.jensen2022_found import found
-from weighbridge.papers.jensen2022_items import ITEMS
 from weighbridge.papers.jensen2022_reproduction import SEED, Reproduction, Settings, reproduce
 from weighbridge.papers.jensen2022_tables import (
+    PAPER_R_SQUARED,
+    PAPER_ROAD,
+    PAPER_WEIGHTS,
+    ROAD_UNITS,
+    WEIGHT_UNITS,
     drives_table,
     highway_table,
     parameters_table,
+    with_units,
 )
 from weighbridge.papers.reproduced import Progress, Reproduced
 
@@ -40,6 +46,33 @@ __all__ = [
     "reproduced",
     "scenario",
 ]
+
+_OURS: Final = "our navigation, lateness, fit and rows; the wind is unknown"
+
+
+def _items() -> Iterator[Item]:
+    """Yield the items; ``both`` is a figure by the paper's own rules, and the same by ours."""
+    rows = read_rows(
+        "jensen2022",
+        road=with_units(PAPER_ROAD, ROAD_UNITS),
+        weights=with_units(PAPER_WEIGHTS, WEIGHT_UNITS),
+        r_squared=f"{PAPER_R_SQUARED}",
+    )
+    for row in (row for section in rows.values() for row in section):
+        name = row.pop("both", None)
+        if name is None:
+            yield from items_of([row])
+            continue
+        row = {"where": "report", **row}
+        own = {key: row.pop(f"own_{key}", "") for key in ("why", "check")}
+        theirs = row | {"ours": f"{{{name} printed}}"}
+        own["why"] = listed(own["why"], _OURS)
+        ours = row | own | {"seen": "", "ours": f"{{{name} ours}}", "conditions": "ours"}
+        yield from items_of([theirs, ours])
+
+
+ITEMS: Final = tuple(_items())
+"""Equations, tables and figures in the order of the paper."""
 
 SETTINGS: Final = Settings
 """What ``weighbridge reproduce jensen2022 --set`` changes."""

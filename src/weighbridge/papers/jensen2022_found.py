@@ -60,7 +60,7 @@ SETTLED: Final = 600.0
 
 
 def found(done: Reproduction) -> dict[str, Found]:
-    """Every figure that `weighbridge.papers.jensen2022_items.ITEMS` asks for."""
+    """Every figure that `weighbridge.papers.jensen2022.ITEMS` asks for."""
     each = equations() | _given() | _car(done) | _sample(done) | gradient_figures(done.gradient)
     both = (("printed", done.printed), ("ours", done.drives))
     for way, drives in both:

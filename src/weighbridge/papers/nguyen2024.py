@@ -6,70 +6,17 @@ filter, Transport and Communications Science Journal 75(4), 2024, 1593-1603.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from weighbridge.inertia import AXES, InertiaTrack, RideSamples, estimate, ride_samples
-from weighbridge.papers.claims import Found, same
-from weighbridge.papers.nguyen2024_cases import (
-    AS_IN_PRINT as AS_IN_PRINT,
-)
-from weighbridge.papers.nguyen2024_cases import (
-    AS_PRINTED as AS_PRINTED,
-)
-from weighbridge.papers.nguyen2024_cases import (
-    AS_VARIANCE as AS_VARIANCE,
-)
-from weighbridge.papers.nguyen2024_cases import (
-    CASES as CASES,
-)
-from weighbridge.papers.nguyen2024_cases import (
-    CHANGES as CHANGES,
-)
-from weighbridge.papers.nguyen2024_cases import (
-    DURATION as DURATION,
-)
-from weighbridge.papers.nguyen2024_cases import (
-    EXTENDED as EXTENDED,
-)
-from weighbridge.papers.nguyen2024_cases import (
-    HIGHER_NOISE as HIGHER_NOISE,
-)
-from weighbridge.papers.nguyen2024_cases import (
-    INVERSE as INVERSE,
-)
-from weighbridge.papers.nguyen2024_cases import (
-    LOWER_NOISE as LOWER_NOISE,
-)
-from weighbridge.papers.nguyen2024_cases import (
-    NOISE as NOISE,
-)
-from weighbridge.papers.nguyen2024_cases import (
-    ORDINARY_SENSORS as ORDINARY_SENSORS,
-)
-from weighbridge.papers.nguyen2024_cases import (
-    PAPERS_CASE as PAPERS_CASE,
-)
-from weighbridge.papers.nguyen2024_cases import (
-    PAPERS_SENSORS as PAPERS_SENSORS,
-)
-from weighbridge.papers.nguyen2024_cases import (
-    PRINTED_NOISE as PRINTED_NOISE,
-)
-from weighbridge.papers.nguyen2024_cases import (
-    START as START,
-)
-from weighbridge.papers.nguyen2024_cases import (
-    Case as Case,
-)
-from weighbridge.papers.nguyen2024_cases import (
-    Settings as Settings,
-)
+from weighbridge.papers import nguyen2024_cases as cases
+from weighbridge.papers.claims import Found, items_of, listed, read_rows, same
+from weighbridge.papers.nguyen2024_cases import Case, Settings
 from weighbridge.papers.nguyen2024_equations import equations
-from weighbridge.papers.nguyen2024_items import ITEMS as ITEMS
 from weighbridge.papers.nguyen2024_judged import RideResult as RideResult
 from weighbridge.papers.nguyen2024_judged import judge as judge
 from weighbridge.papers.nguyen2024_judged import suspension_of as suspension_of
@@ -92,21 +39,41 @@ PAPER_VELOCITY_MAPE: Final = (3.50, 1.21, 0.851)
 PAPER_TIME: Final = 0.5
 """Until within 10 % of the changed parameters, sec. 5 [s]."""
 
+_ROWS: Final = read_rows("nguyen2024")
+
+
+def _of_each() -> Iterator[dict[str, str]]:
+    """Yield what Table 2 and sec. 5 state, by each filter."""
+    for filter_ in _ROWS["filters"]:
+        code, words = filter_.pop("code"), filter_.pop("words")
+        for row in _ROWS["of_each"]:
+            yield {
+                **filter_,
+                **row,
+                "what": f"{row['what']}, {words}",
+                "ours": f"{{{row['ours']} {code}}}",
+                "why": listed(filter_["why"], row.get("why", "")),
+            }
+
+
+ITEMS: Final = (*items_of(_ROWS["items"]), *items_of(_of_each()))
+"""In the paper's order; mass / roll / pitch, median of the roads unless said."""
+
 SEED: Final = 196_100
 """Of the first road; nothing was chosen on it and those after it."""
 
 ROADS: Final = 20
 """Roads drawn; the paper has one."""
 
-DRAWN: Final = (PAPERS_CASE.name, EXTENDED.name)
+DRAWN: Final = (cases.PAPERS_CASE.name, cases.EXTENDED.name)
 """Cases of which figs. 5 and 6 are drawn: our filter, and beside it the paper's."""
 
 FOLLOWED: Final = {
-    "as printed": AS_IN_PRINT,
-    "printed noise": PRINTED_NOISE,
-    "extended": EXTENDED,
-    "inverse": INVERSE,
-    "ours": PAPERS_CASE,
+    "as printed": cases.AS_IN_PRINT,
+    "printed noise": cases.PRINTED_NOISE,
+    "extended": cases.EXTENDED,
+    "inverse": cases.INVERSE,
+    "ours": cases.PAPERS_CASE,
 }
 """Cases of which all that Table 2 and sec. 5 state is listed, by the code of their figures."""
 
@@ -129,7 +96,7 @@ def simulate(seed: int, sensors: RideSensors, settings: Settings | None = None) 
         RideScenario(
             road_class="C",
             speed=settings.speed,
-            duration=DURATION,
+            duration=cases.DURATION,
             changes=settings.changes,
             shake=settings.shake,
             sensors=sensors,
@@ -138,7 +105,7 @@ def simulate(seed: int, sensors: RideSensors, settings: Settings | None = None) 
     )
 
 
-def run(case: Case, made: SimulatedRide, start: float = START) -> InertiaTrack:
+def run(case: Case, made: SimulatedRide, start: float = cases.START) -> InertiaTrack:
     """Run the filter of a case from ``start`` times the nominal parameters."""
     ride = suspension_of(TRUCK, case.sensors, start)
     samples: RideSamples = ride_samples(made.drive)
@@ -149,7 +116,7 @@ def reproduce(
     *,
     seed: int = SEED,
     roads: int = ROADS,
-    cases: tuple[Case, ...] = CASES,
+    cases: tuple[Case, ...] = cases.CASES,
     progress: Progress | None = None,
     settings: Settings | None = None,
 ) -> tuple[dict[str, list[RideResult]], dict[str, Shown]]:
@@ -205,7 +172,7 @@ def reproduced(
             five = velocity_panels(run.track, run.made.velocities, "true")
             panels += [_titled(p, name, f"Figure 6 of the paper. {p.caption}") for p in six]
             panels += [_titled(p, name, "Figure 5 of the paper, five seconds.") for p in five]
-        panels.append(innovation_panel(shown[PAPERS_CASE.name].track))
+        panels.append(innovation_panel(shown[cases.PAPERS_CASE.name].track))
         write_study("Nguyen 2024, reproduced on simulated rides", tables, panels, path)
 
     figures = _figures(results)
@@ -213,7 +180,7 @@ def reproduced(
         title="Nguyen 2024",
         note=f"{ROADS} random roads of class C, seeds {seed} to {seed + ROADS - 1}{apart}, median "
         "of the roads unless said",
-        tables=(_table_2(results[PAPERS_CASE.name]), _cases_table(results)),
+        tables=(_table_2(results[cases.PAPERS_CASE.name]), _cases_table(results)),
         rows=tuple(item.row("nguyen2024", figures) for item in ITEMS),
         write_page=write,
     )
@@ -231,7 +198,7 @@ def _figures(results: dict[str, list[RideResult]]) -> dict[str, Found]:
         found |= {f"{name} {code}": f for name, f in followed(results[case.name]).items()}
     by_noise = [
         100.0 * np.median(_each(results[case.name], "mape"), axis=0)
-        for case in (HIGHER_NOISE, PRINTED_NOISE, LOWER_NOISE)
+        for case in (cases.HIGHER_NOISE, cases.PRINTED_NOISE, cases.LOWER_NOISE)
     ]
     falls = bool(np.all(np.diff(by_noise, axis=0) < 0.0))
     found["sections"] = Found("; ".join(f"{_three(each)} %" for each in by_noise), falls)
