@@ -2,13 +2,16 @@
 
 Identifier, transport protocol and the coding of values that are missing follow
 SAE J1939-21 (data link layer) and SAE J1939-71 (vehicle application layer).
-The table below holds facts of J1939-71 only: group, place, resolution, offset.
+The table `j1939.csv` holds facts of J1939-71 only: group, place, resolution, offset.
 """
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from fractions import Fraction
+from importlib.resources import files
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -19,19 +22,8 @@ from weighbridge.io.j1939_transport import assemble
 from weighbridge.signals import Bools, Floats, Problem, Signal, clean_signal, to_si
 from weighbridge.signals.words import counted
 
-EEC1, EEC2, EEC3 = 0xF004, 0xF003, 0xFEDF
-ETC1, ETC2 = 0xF002, 0xF005
-CCVS1, EBC1, ERC1 = 0xFEF1, 0xF001, 0xF000
-VDHR, AMB, LFE, VW, CVW = 0xFEC1, 0xFEF5, 0xFEF2, 0xFEEA, 0xFE70
-EC1 = 0xFEE3
+EEC1, EC1, VW = 0xF004, 0xFEE3, 0xFEEA
 TP_CM, TP_DT = 0xEC00, 0xEB00
-
-NAMES: Final[dict[int, str]] = {
-    EEC1: "EEC1", EEC2: "EEC2", EEC3: "EEC3", ETC1: "ETC1", ETC2: "ETC2", CCVS1: "CCVS1",
-    EBC1: "EBC1", ERC1: "ERC1", VDHR: "VDHR", AMB: "AMB", LFE: "LFE", VW: "VW", CVW: "CVW",
-    EC1: "EC1", TP_CM: "TP.CM", TP_DT: "TP.DT",
-}  # fmt: skip
-"""Parameter groups by number, with the acronyms of J1939-71."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,36 +53,31 @@ class Spn:
     unit: str = ""
 
 
-SPNS: Final[tuple[Spn, ...]] = (
-    Spn(513, "actual_torque", EEC1, 3, 1, 8, 1.0, -125.0, "pct"),
-    Spn(190, "engine_speed", EEC1, 4, 1, 16, 0.125, 0.0, "rpm"),
-    Spn(91, "throttle", EEC2, 2, 1, 8, 0.4, 0.0, "pct"),
-    Spn(92, "engine_load", EEC2, 3, 1, 8, 1.0, 0.0, "pct"),
-    Spn(514, "friction_torque", EEC3, 1, 1, 8, 1.0, -125.0, "pct"),
-    Spn(2978, "parasitic_torque", EEC3, 5, 1, 8, 1.0, -125.0, "pct"),
-    Spn(560, "driveline_engaged", ETC1, 1, 1, 2),
-    Spn(574, "shift_in_process", ETC1, 1, 5, 2),
-    Spn(191, "output_shaft_speed", ETC1, 2, 1, 16, 0.125, 0.0, "rpm"),
-    Spn(522, "clutch_slip", ETC1, 4, 1, 8, 0.4, 0.0, "pct"),
-    Spn(161, "input_shaft_speed", ETC1, 6, 1, 16, 0.125, 0.0, "rpm"),
-    Spn(526, "gear_ratio", ETC2, 2, 1, 16, 0.001),
-    Spn(523, "gear", ETC2, 4, 1, 8, 1.0, -125.0),
-    Spn(84, "vehicle_speed", CCVS1, 2, 1, 16, 1.0 / 256.0, 0.0, "kmh"),
-    Spn(597, "brake", CCVS1, 4, 5, 2),
-    Spn(598, "clutch", CCVS1, 4, 7, 2),
-    Spn(1121, "ebs_brake", EBC1, 1, 7, 2),
-    Spn(521, "brake_pedal", EBC1, 2, 1, 8, 0.4, 0.0, "pct"),
-    Spn(520, "retarder_torque", ERC1, 2, 1, 8, 1.0, -125.0, "pct"),
-    Spn(917, "distance", VDHR, 1, 1, 32, 5.0, 0.0, "m"),
-    Spn(108, "barometric_pressure", AMB, 1, 1, 8, 0.5, 0.0, "kpa"),
-    Spn(171, "ambient_temperature", AMB, 4, 1, 16, 0.03125, -273.0, "degc"),
-    Spn(183, "fuel_rate", LFE, 1, 1, 16, 0.05, 0.0, "lph"),
-    Spn(928, "axle", VW, 1, 1, 8),
-    Spn(582, "axle_weight", VW, 2, 1, 16, 0.5, 0.0, "kg"),
-    Spn(1585, "powered_weight", CVW, 1, 1, 16, 10.0, 0.0, "kg"),
-    Spn(1760, "maker_mass", CVW, 3, 1, 16, 10.0, 0.0, "kg"),
-    Spn(544, "reference_torque", EC1, 20, 1, 16, 1.0, 0.0, "nm"),
+def _spn(
+    number: str, name: str, pgn: str, resolution: str, offset: str, unit: str, **places: str
+) -> Spn:
+    """Parameter of a row of `j1939.csv`: its group is hexadecimal, its resolution a fraction."""
+    whole = {key: int(place) for key, place in places.items()}
+    factor = float(Fraction(resolution))
+    return Spn(
+        int(number), name, int(pgn, 16), resolution=factor, offset=float(offset), unit=unit, **whole
+    )
+
+
+_ROWS: Final = tuple(
+    csv.DictReader(
+        files("weighbridge.io").joinpath("j1939.csv").read_text(encoding="utf-8").splitlines()
+    )
 )
+
+NAMES: Final = {
+    **{int(row["pgn"], 16): row.pop("group") for row in _ROWS},
+    TP_CM: "TP.CM",
+    TP_DT: "TP.DT",
+}
+"""Parameter groups by number, with the acronyms of J1939-71."""
+
+SPNS: Final = tuple(_spn(**row) for row in _ROWS)
 """Every parameter read, all of SAE J1939-71."""
 
 SPN: Final = {s.name: s for s in SPNS}

@@ -7,8 +7,11 @@ Requests are not needed: an answer says what it answers, and when.
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from fractions import Fraction
+from importlib.resources import files
 from typing import Final
 
 import numpy as np
@@ -58,40 +61,15 @@ class Pid:
     needs: int = 0
 
 
-_PCT: Final = 100.0 / 255.0
+def _pid(number: str, name: str, scale: str, offset: str, unit: str, **counts: str) -> Pid:
+    """Parameter of a row of `obd.csv`: its number is hexadecimal, its scale a fraction."""
+    whole = {key: int(count) for key, count in counts.items()}
+    factor = float(Fraction(scale))
+    return Pid(int(number, 16), name, scale=factor, offset=float(offset), unit=unit, **whole)
 
-PIDS: Final[tuple[Pid, ...]] = (
-    Pid(0x04, "engine_load", 0, 1, _PCT, 0.0, "pct"),
-    Pid(0x05, "coolant_temperature", 0, 1, 1.0, -40.0, "degc"),
-    Pid(0x0B, "intake_pressure", 0, 1, 1.0, 0.0, "kpa"),
-    Pid(0x0C, "engine_speed", 0, 2, 0.25, 0.0, "rpm"),
-    Pid(0x0D, "vehicle_speed", 0, 1, 1.0, 0.0, "kmh"),
-    Pid(0x0F, "intake_temperature", 0, 1, 1.0, -40.0, "degc"),
-    Pid(0x10, "mass_air_flow", 0, 2, 0.01, 0.0, "gps"),
-    Pid(0x11, "throttle", 0, 1, _PCT, 0.0, "pct"),
-    Pid(0x1F, "run_time", 0, 2, 1.0, 0.0, "s"),
-    Pid(0x2F, "fuel_level", 0, 1, _PCT, 0.0, "pct"),
-    Pid(0x33, "barometric_pressure", 0, 1, 1.0, 0.0, "kpa"),
-    Pid(0x34, "lambda_1", 0, 2, 2.0 / 65536.0, 0.0, ""),
-    Pid(0x42, "module_voltage", 0, 2, 0.001, 0.0, "v"),
-    Pid(0x43, "absolute_load", 0, 2, _PCT, 0.0, "pct"),
-    Pid(0x44, "commanded_lambda", 0, 2, 2.0 / 65536.0, 0.0, ""),
-    Pid(0x45, "relative_throttle", 0, 1, _PCT, 0.0, "pct"),
-    Pid(0x46, "ambient_temperature", 0, 1, 1.0, -40.0, "degc"),
-    Pid(0x47, "throttle_b", 0, 1, _PCT, 0.0, "pct"),
-    Pid(0x49, "accelerator_pedal", 0, 1, _PCT, 0.0, "pct"),
-    Pid(0x4C, "commanded_throttle", 0, 1, _PCT, 0.0, "pct"),
-    Pid(0x5A, "relative_pedal", 0, 1, _PCT, 0.0, "pct"),
-    Pid(0x5C, "oil_temperature", 0, 1, 1.0, -40.0, "degc"),
-    Pid(0x5E, "fuel_rate", 0, 2, 0.05, 0.0, "lph"),
-    Pid(0x61, "demanded_torque", 0, 1, 1.0, -125.0, "pct"),
-    Pid(0x62, "engine_torque_fraction", 0, 1, 1.0, -125.0, "pct"),
-    Pid(0x63, "reference_torque", 0, 2, 1.0, 0.0, "nm"),
-    *(Pid(0x64, f"torque_point_{k}", k, 1, 1.0, -125.0, "pct") for k in range(5)),
-    Pid(0xA4, "gear", 1, 1, 1.0, 0.0, "", shift=4, needs=0x01),
-    Pid(0xA4, "gear_ratio", 2, 2, 0.001, 0.0, "", needs=0x02),
-    Pid(0xA6, "odometer", 0, 4, 0.1, 0.0, "km"),
-)
+
+_ROWS: Final = files("weighbridge.io").joinpath("obd.csv").read_text(encoding="utf-8")
+PIDS: Final = tuple(_pid(**row) for row in csv.DictReader(_ROWS.splitlines()))
 """The parameters that are decoded; facts of SAE J1979."""
 
 # How many bytes of value follow each parameter's number in an answer (SAE J1979). An answer
