@@ -5,7 +5,9 @@ from __future__ import annotations
 import shutil
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, replace
+from importlib.resources import files
 from pathlib import Path
+from string import Template
 from typing import Any, Final
 
 import numpy as np
@@ -235,36 +237,13 @@ def _readme(settings: BenchmarkSettings, count: int) -> str:
     def listed(names: dict[str, Any], text: Callable[[Any], str]) -> str:
         return "\n".join(f"- `{name}`: {text(value)}" for name, value in names.items())
 
-    return f"""# Drives of unknown mass
-
-{plural(count, "drive")} to weigh, made by the simulator of weighbridge {VERSION} with seed
-{settings.seed}.
-`drives.csv` lists them with their slices. Each vehicle has a folder with its data sheet
-(`vehicle.toml`), its drives of known mass (`calibration-*`, mass in `drive.toml`) and its drives
-to weigh (`drive-*`). A program may use all of that, and nothing of `truth.csv`.
-
-A drive is a folder of Parquet tables, each on its own clock `time_s` [s]. The unit is the suffix
-of a column. `imu`: specific force and angular rate in the axes of a sensor that is mounted a few
-degrees off forward-right-down. `obd`: what the vehicle bus sends, late and rounded. `gnss`:
-position, height, speed and course.
-
-The result is a CSV file: `drive,mass_kg,std_kg`, one row a drive, and if known `low_kg,high_kg`
-of the 95 % interval. The mass is that of all that rolls, at the end of the drive. An empty mass is
-a refusal. `weighbridge benchmark score RESULTS.csv --truth truth.csv` prints the score.
-
-Equipment:
-
-{listed(EQUIPMENT, str)}
-
-Calibration:
-
-{listed(CALIBRATIONS, lambda n: f"{plural(n, 'drive')} of known mass")}
-
-Classes: {", ".join(CLASSES)}. Roads: {", ".join(ROUTES)}.
-
-Limits: one simulator made all of it. Its vehicles have wind, warm-up, slip, squat, hills, bends,
-drivers and sensor errors, but no trailers, no change of load, no faults of a sensor. A method that
-was tuned on this simulator will look better than it is.
-
-Licence: CC0 1.0, see `LICENSE`.
-"""
+    page = files("weighbridge.benchmark").joinpath("readme.md").read_text(encoding="utf-8")
+    return Template(page).substitute(
+        drives=plural(count, "drive"),
+        version=VERSION,
+        seed=settings.seed,
+        equipment=listed(EQUIPMENT, str),
+        calibrations=listed(CALIBRATIONS, lambda n: f"{plural(n, 'drive')} of known mass"),
+        classes=", ".join(CLASSES),
+        routes=", ".join(ROUTES),
+    )
