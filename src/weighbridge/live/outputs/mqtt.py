@@ -8,9 +8,11 @@ import math
 import re
 import secrets
 import sqlite3
+import tomllib
 import unicodedata
 from collections.abc import Collection
 from dataclasses import dataclass, field
+from importlib.resources import files
 from pathlib import Path
 from threading import Condition, Event, Thread
 from time import monotonic
@@ -38,8 +40,6 @@ VSS_TOPIC: Final = "Vehicle/CurrentOverallWeight"
 _HIGHEST: Final = 65_535
 
 _SIDES: Final[tuple[Side, ...]] = ("above", "below")
-
-_ON_OR_OFF: Final = "{{{{ 'ON' if {} else 'OFF' }}}}"
 
 # What is left of a vehicle's name where its owner gave it none, or none in Latin letters.
 _UNNAMED: Final = "vehicle"
@@ -162,58 +162,16 @@ class Topics:
         ----------
         Home Assistant, MQTT integration, device discovery payload.
         """
-        weight = {
-            "device_class": "weight",
-            "unit_of_measurement": "kg",
-            "state_class": "measurement",
-            "suggested_display_precision": 0,
-        }
-        part = {"unit_of_measurement": "%", "state_class": "measurement", "icon": "mdi:weight"}
-        why = {
-            "icon": "mdi:scale",
-            "json_attributes_topic": self.weighing,
-            "json_attributes_template": "{{ {'reason': value_json.reason, "
-            "'advice': value_json.advice, 'notes': value_json.notes} | tojson }}",
-        }
-        rows: list[tuple[str, str, str, str, dict[str, Any]]] = [
-            ("sensor", "mass", "Mass", "{{ value_json.mass_kg }}", weight),
-            ("sensor", "std", "Standard deviation of the mass", "{{ value_json.std_kg }}", weight),
-            ("sensor", "payload", "Payload", "{{ value_json.payload_kg }}", weight),
-            ("sensor", "status", "Status", "{{ value_json.status }}", why),
-            ("sensor", "progress", "Progress to 5 %", _percent_of("progress_to_5"), part),
-            (
-                "sensor",
-                "overload",
-                "Overload probability",
-                _percent_of("overload_probability"),
-                part,
-            ),
-            (
-                "sensor",
-                "kerb_change",
-                "Change of load by tilt",
-                "{{ value_json.kerb.change_kg }}",
-                weight,
-            ),
-            ("binary_sensor", "parked", "Parked", _ON_OR_OFF.format("value_json.parked"), {}),
-        ]
-        for side in _SIDES:
-            active = f"value_json.alerts | selectattr('side', 'eq', '{side}')"
-            template = _ON_OR_OFF.format(f"{active} | selectattr('active') | list")
-            name = f"{side.capitalize()} the limit"
-            rows.append(("binary_sensor", side, name, template, {"device_class": "problem"}))
-        entities = {
-            key: {"p": platform}
-            if key in _SIDES and key not in self._sides
-            else {
-                "p": platform,
-                "name": name,
-                "unique_id": f"weighbridge_{self.node}_{key}",
-                "value_template": template,
-                **more,
-            }
-            for platform, key, name, template, more in rows
-        }
+        text = files("weighbridge.live.outputs").joinpath("homeassistant.toml")
+        listed = tomllib.loads(text.read_text(encoding="utf-8"))
+        listed["reasons"]["json_attributes_topic"] = self.weighing
+        entities = {}
+        for key, entity in listed["entity"].items():
+            more = listed.get(entity.pop("like", ""), {})
+            known = key not in _SIDES or key in self._sides
+            entities[key] = {"p": entity["p"]}
+            if known:
+                entities[key] |= entity | {"unique_id": f"weighbridge_{self.node}_{key}"} | more
         origin = {"name": "weighbridge", "sw": VERSION}
         device = {
             "ids": [f"weighbridge_{self.node}"],
@@ -230,14 +188,11 @@ class Topics:
             "availability_topic": self.available,
         }
         node = f"weighbridge_{self.node}"
-        before = [(f"homeassistant/{p}/{node}/{key}/config", b"") for p, key, *_ in rows]
+        before = [
+            (f"homeassistant/{entity['p']}/{node}/{key}/config", b"")
+            for key, entity in entities.items()
+        ]
         return [*before, (f"homeassistant/device/{node}/config", json.dumps(payload).encode())]
-
-
-def _percent_of(key: str) -> str:
-    """Write the template of a part that may be unknown."""
-    value = f"value_json.{key}"
-    return f"{{{{ (100 * {value}) | round(1) if {value} is not none else none }}}}"
 
 
 class Mqtt:
