@@ -5,7 +5,6 @@ from __future__ import annotations
 import shutil
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, replace
-from importlib.resources import files
 from pathlib import Path
 from string import Template
 from typing import Any, Final
@@ -23,6 +22,7 @@ from weighbridge.benchmark.plan import (
     PlannedVehicle,
     plan,
 )
+from weighbridge.data import text_of
 from weighbridge.errors import ConfigError
 from weighbridge.io import PARSE_ERRORS, first_line
 from weighbridge.io.write import write_drive, write_frame
@@ -237,8 +237,7 @@ def _readme(settings: BenchmarkSettings, count: int) -> str:
     def listed(names: dict[str, Any], text: Callable[[Any], str]) -> str:
         return "\n".join(f"- `{name}`: {text(value)}" for name, value in names.items())
 
-    page = files("weighbridge.benchmark").joinpath("readme.md").read_text(encoding="utf-8")
-    return Template(page).substitute(
+    return Template(text_of("benchmark", "readme.md")).substitute(
         drives=plural(count, "drive"),
         version=VERSION,
         seed=settings.seed,

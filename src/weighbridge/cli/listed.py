@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable, Iterable
-from importlib.resources import files
 from typing import Any, Final
 
 import typer
 from typer.core import TyperCommand, TyperOption
 
+from weighbridge.data import toml_of
+
 FORMATS: Final = ("parquet", "csv")
 """Formats of the tables of a drive."""
 
-_WORDS: Final = tomllib.loads(
-    files("weighbridge.cli").joinpath("options.toml").read_text(encoding="utf-8")
-)
+_WORDS: Final = toml_of("cli", "options.toml")
 
 
 def option(name: str, **settings: Any) -> Any:

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import json
 from html import escape
-from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import polars as pl
 
+from weighbridge.data import text_of
 from weighbridge.fleet.names import some
 from weighbridge.report.text import NOTHING
 from weighbridge.visible import visible
@@ -69,10 +69,7 @@ def page(report: FleetReport, title: str) -> str:
     report
     title : heading; shown, never obeyed
     """
-    here, other = files(__package__), files("weighbridge.report")
-    style = other.joinpath("page.css").read_text("utf-8") + here.joinpath("page.css").read_text(
-        "utf-8"
-    )
+    style = text_of("report", "page.css") + text_of("fleet", "page.css")
     title = escape(visible(title))
     links = "".join(f'<a href="#{key}">{name}</a>' for key, name, _ in _SECTIONS)
     # Nothing can end the element that holds the data: every < in it is an escape.
@@ -102,7 +99,7 @@ def page(report: FleetReport, title: str) -> str:
         "<footer>Made by weighbridge from data the vehicles recorded. For screening: not a "
         "legal-for-trade weighing. Times are UTC.</footer>",
         f'<script type="application/json" id="data">{data}</script>',
-        f"<script>{here.joinpath('page.js').read_text('utf-8')}</script></body></html>\n",
+        f"<script>{text_of('fleet', 'page.js')}</script></body></html>\n",
     ]
     return "".join(parts)
 

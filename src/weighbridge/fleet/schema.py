@@ -6,11 +6,11 @@ They belong together by ``key`` and ``part``. Numbers are null where there is no
 
 from __future__ import annotations
 
-import tomllib
-from importlib.resources import files
 from typing import Final, NamedTuple
 
 import polars as pl
+
+from weighbridge.data import toml_of
 
 FORMAT_VERSION: Final = 7
 """Version of the tables; part of every key, so that another one weighs anew."""
@@ -53,9 +53,7 @@ _TYPES: Final[dict[str, pl.DataType]] = {
     "date": pl.Date(),
     "time": pl.Datetime("us", "UTC"),
 }
-_LISTED: Final = tomllib.loads(
-    files("weighbridge.fleet").joinpath("schema.toml").read_text(encoding="utf-8")
-)
+_LISTED: Final = toml_of("fleet", "schema.toml")
 
 
 def _columns(table: str) -> dict[str, Column]:

@@ -9,13 +9,12 @@ from __future__ import annotations
 import difflib
 import logging
 import sys
-import tomllib
 from collections.abc import Callable, Sequence
 from functools import cache, lru_cache
-from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from weighbridge.data import toml_of
 from weighbridge.first_use import at_first_call
 from weighbridge.io.format import Format, Takes, starts_with
 from weighbridge.io.log import Log
@@ -79,9 +78,7 @@ def _format(
     )
 
 
-_TABLE: Final = tomllib.loads(
-    files("weighbridge.io").joinpath("formats.toml").read_text(encoding="utf-8")
-)
+_TABLE: Final = toml_of("io", "formats.toml")
 
 FORMATS: Final = tuple(_format(name, **record) for name, record in _TABLE["format"].items())
 """The formats of this project, in the order of `formats.toml`."""

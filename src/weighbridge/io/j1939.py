@@ -7,16 +7,15 @@ The table `j1939.csv` holds facts of J1939-71 only: group, place, resolution, of
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
-from importlib.resources import files
 from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from weighbridge.data import rows_of
 from weighbridge.io.frames import Frames, bits
 from weighbridge.io.j1939_transport import assemble
 from weighbridge.signals import Bools, Floats, Problem, Signal, clean_signal, to_si
@@ -64,11 +63,7 @@ def _spn(
     )
 
 
-_ROWS: Final = tuple(
-    csv.DictReader(
-        files("weighbridge.io").joinpath("j1939.csv").read_text(encoding="utf-8").splitlines()
-    )
-)
+_ROWS: Final = rows_of("io", "j1939.csv")
 
 NAMES: Final = {
     **{int(row["pgn"], 16): row.pop("group") for row in _ROWS},

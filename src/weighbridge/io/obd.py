@@ -7,16 +7,15 @@ Requests are not needed: an answer says what it answers, and when.
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
-from importlib.resources import files
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from weighbridge.data import rows_of
 from weighbridge.io.frames import Frames, bits
 from weighbridge.io.isotp import Messages, join_messages
 from weighbridge.signals import (
@@ -68,8 +67,7 @@ def _pid(number: str, name: str, scale: str, offset: str, unit: str, **counts: s
     return Pid(int(number, 16), name, scale=factor, offset=float(offset), unit=unit, **whole)
 
 
-_ROWS: Final = files("weighbridge.io").joinpath("obd.csv").read_text(encoding="utf-8")
-PIDS: Final = tuple(_pid(**row) for row in csv.DictReader(_ROWS.splitlines()))
+PIDS: Final = tuple(_pid(**row) for row in rows_of("io", "obd.csv"))
 """The parameters that are decoded; facts of SAE J1979."""
 
 # How many bytes of value follow each parameter's number in an answer (SAE J1979). An answer

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from configparser import ConfigParser
-from importlib.resources import files
 from typing import Final
 
+from weighbridge.data import text_of
+
 _FILE: Final = ConfigParser(interpolation=None, delimiters="=")
-_FILE.read_string(files("weighbridge.io").joinpath("names.ini").read_text(encoding="utf-8"))
+_FILE.read_string(text_of("io", "names.ini"))
 
 
 def words_in(name: str) -> dict[str, tuple[str, ...]]:

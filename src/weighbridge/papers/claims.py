@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import string
-import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from enum import StrEnum
-from importlib.resources import files
 from string import Template
 from typing import Any, Final
 
 import numpy as np
 
+from weighbridge.data import toml_of
 from weighbridge.errors import ConfigError
 from weighbridge.report.table import Table
 from weighbridge.report.text import capital
@@ -198,8 +197,7 @@ def read_rows(paper: str, **values: str) -> dict[str, list[dict[str, str]]]:
         row with several items is one for each
     values : further words
     """
-    text = files("weighbridge.papers").joinpath(f"{paper}.toml").read_text(encoding="utf-8")
-    table = tomllib.loads(text)
+    table = toml_of("papers", f"{paper}.toml")
     words = {"exact": EXACT, **values}
     for name, word in table.pop("words").items():
         words[name] = Template(word).substitute(words)

@@ -8,10 +8,10 @@ import json
 from collections.abc import Sequence
 from functools import cache
 from html import escape
-from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+from weighbridge.data import text_of
 from weighbridge.report.markup import left_out, text_table
 from weighbridge.report.style import Panel, Section, in_shown_units
 from weighbridge.visible import shown_json, visible, visible_text
@@ -99,7 +99,6 @@ def write_document(
     ConfigError
         The file cannot be written.
     """
-    here = files(__package__)
     # Texts of files are shown, never obeyed: no control character turns a line round.
     heading = visible(heading)
     html = "".join(
@@ -110,7 +109,7 @@ def write_document(
             # No address is ever asked for anything: icon, styles and scripts are inside.
             '<link rel="icon" href="data:,">',
             f"<title>{escape(heading)}</title>",
-            f"<style>{here.joinpath('page.css').read_text(encoding='utf-8')}</style>",
+            f"<style>{text_of('report', 'page.css')}</style>",
             f"</head><body><h1>{escape(heading)}</h1>",
             "<noscript><p>The figures need JavaScript; the tables do not.</p></noscript>"
             '<p id="old" hidden>The figures need a browser of 2023 or later.</p>',
@@ -120,7 +119,7 @@ def write_document(
             f"holds the value with 95 % probability.{_asked(tiles)}</footer>",
             f'<script type="text/plain" id="figures">{packed(page.data())}</script>',
             f'<script type="text/plain" id="library">{_library()}</script>' if page.figures else "",
-            f"<script>{here.joinpath('page.js').read_text(encoding='utf-8')}</script>",
+            f"<script>{text_of('report', 'page.js')}</script>",
             "</body></html>\n",
         ]
     )
@@ -144,5 +143,4 @@ def packed(text: str) -> str:
 @cache
 def _library() -> str:
     """The plot library with the traces that figures use, packed."""
-    bundle = files(__package__) / "plotly" / "plotly-basic.min.js"
-    return packed(bundle.read_text(encoding="utf-8"))
+    return packed(text_of("report", "plotly/plotly-basic.min.js"))

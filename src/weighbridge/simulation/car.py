@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass
-from importlib.resources import files
 from typing import Any, Final, Literal
 
 import numpy as np
 
+from weighbridge.data import toml_of
 from weighbridge.errors import ConfigError
 
 RPM = math.pi / 30.0
@@ -252,9 +251,7 @@ _TO_SI: Final[dict[str, Callable[[float], float]]] = {
     "_deg": math.radians,
     "_kmh": lambda value: value / 3.6,
 }
-_LISTED: Final = tomllib.loads(
-    files("weighbridge.simulation").joinpath("vehicles.toml").read_text(encoding="utf-8")
-)
+_LISTED: Final = toml_of("simulation", "vehicles.toml")
 
 
 def listed_car(name: str) -> SimulatedCar:

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from functools import partial
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
 from weighbridge.arguments import suggestion
+from weighbridge.data import toml_of
 from weighbridge.errors import ConfigError
 from weighbridge.simulation.car import COMPACT, ELECTRIC, MIDSIZE, SimulatedCar
 from weighbridge.simulation.route import (
@@ -34,9 +35,13 @@ from weighbridge.simulation.vehicles import (
 Maker = Callable[[float, int], Scenario]
 """Makes a scenario from payload [kg] and seed."""
 
-_ELECTRIC_POLLING: Final = Polling(
-    fast=("vehicle_speed", "engine_speed", "engine_torque"), rate=10.0, delay=0.08
-)
+_LISTED: Final = toml_of("simulation", "scenarios.toml")
+
+
+def _polling(name: str) -> Polling:
+    """Return what control units are asked for, of `scenarios.toml`."""
+    listed: dict[str, Any] = dict(_LISTED["polling"][name])
+    return Polling(**listed | {k: tuple(listed[k]) for k in ("fast", "slow") if k in listed})
 
 
 def _calibrating(name: str, car: SimulatedCar, route_seed: int = 4) -> Maker:
@@ -58,57 +63,8 @@ def _calibrating(name: str, car: SimulatedCar, route_seed: int = 4) -> Maker:
     return make
 
 
-_BUS_POLLING: Final = Polling(
-    fast=(
-        "engine_torque_fraction",
-        "engine_speed",
-        "vehicle_speed",
-        "gear",
-        "brake_switch",
-        "retarder_torque",
-    ),
-    slow=("reference_torque", "ambient_temperature", "barometric_pressure"),
-    rate=100.0,
-    delay=0.03,
-    delay_spread=0.005,
-    delay_jitter=0.002,
-    speed_scale=1.003,
-    speed_step=1.0 / 256.0,
-    engine_speed_step=0.125,
-    net_torque=True,
-)
-
-
-_TRUCK_POLLING: Final = replace(
-    _BUS_POLLING,
-    # Torque and engine speed (EEC1) twice as often as the rest.
-    fast=(
-        "engine_torque_fraction",
-        "engine_speed",
-        "vehicle_speed",
-        "brake_switch",
-        "engine_torque_fraction",
-        "engine_speed",
-        "retarder_torque",
-        "gear",
-    ),
-    rate=10.0,
-)
-TORQUE_POLLING: Final = Polling(
-    fast=("vehicle_speed", "engine_speed", "engine_torque_fraction", "throttle"),
-    slow=("reference_torque", "ambient_temperature", "barometric_pressure"),
-    rate=5.0,
-)
+TORQUE_POLLING: Final = _polling("torque")
 """Of a vehicle that sends its engine's torque in percent by OBD."""
-
-_HYBRID_POLLING: Final = Polling(
-    fast=("vehicle_speed", "engine_speed", "engine_torque", "battery_voltage", "battery_current"),
-    rate=4.0,
-)
-
-_DIESEL_POLLING: Final = Polling(
-    fast=("vehicle_speed", "engine_speed", "engine_load", "throttle"), rate=5.0
-)
 
 
 def usual_polling(car: SimulatedCar) -> Polling:
@@ -126,14 +82,14 @@ def usual_polling(car: SimulatedCar) -> Polling:
         the others.
     """
     if car.kind in ("bus", "truck"):
-        return _TRUCK_POLLING
+        return _polling("truck")
     if car.electric:
-        return _ELECTRIC_POLLING
+        return _polling("electric")
     if car.split is not None:
-        return _HYBRID_POLLING
+        return _polling("hybrid")
     if car.transmission == "stepless":
         return TORQUE_POLLING
-    return _DIESEL_POLLING if car.engine == "diesel" else Polling()
+    return _polling("diesel") if car.engine == "diesel" else Polling()
 
 
 def _on_the_road(name: str, car: SimulatedCar, route: Callable[[], Route]) -> Maker:
@@ -171,7 +127,7 @@ def _bus(payload: float, seed: int) -> Scenario:
         ),
         effects=replace(Effects(), traffic=0.0),
         sensors=Sensors(imu_rate=100.0),
-        polling=_BUS_POLLING,
+        polling=_polling("bus"),
         wind_speed=2.0,
         start_rest=3.0,
         duration=180.0,
@@ -188,7 +144,7 @@ def _bus_urban(payload: float, seed: int) -> Scenario:
         loading=_passengers(places, payload, seed),
         seed=seed,
         sensors=Sensors(imu_rate=100.0),
-        polling=_BUS_POLLING,
+        polling=_polling("bus"),
     )
 
 
@@ -236,29 +192,7 @@ SCENARIOS: Final[dict[str, Maker]] = {
 }
 """Makers of the named scenarios, from payload [kg] and seed."""
 
-ABOUT: Final[dict[str, str]] = {
-    "car": "midsize petrol car, 83 km of city, country, highway and hills, about 75 min",
-    "car-calibration": "the same car in all gears, loads and engine speeds, about 60 min",
-    "car-short": "the same car, 8 km of city and country, about 10 min",
-    "car-loading": "as car, with 240 kg loaded at a stop of 90 s after about 12 min",
-    "highway": "the same car on a highway, out and back",
-    "compact": "small petrol car with a manual gearbox, about 75 min",
-    "compact-calibration": "the small car in all gears, loads and engine speeds",
-    "electric": "electric car whose control unit reports motor torque, about 75 min",
-    "bus": "diesel bus at 100 Hz on a straight road: drives off, brakes at 115 and 147 s, 3 min",
-    "bus-urban": "the same bus in a city, passengers getting on and off at stops, about 55 min",
-    "bus-calibration": "the bus in all gears, loads and engine speeds",
-    "diesel": "diesel car with an 8-speed automatic, about 75 min",
-    "diesel-calibration": "the diesel car in all gears, loads and engine speeds",
-    "cvt": "petrol car with a stepless gearbox that sends its engine's torque, about 75 min",
-    "cvt-calibration": "the same car at all loads and engine speeds",
-    "hybrid": "petrol hybrid (power split) that sends engine torque, battery voltage and current",
-    "hybrid-calibration": "the same car at all loads",
-    "van": "diesel van with a manual gearbox, 2100 kg empty to 3500 kg, about 80 min",
-    "van-calibration": "the van in all gears, loads and engine speeds",
-    "truck": "rigid truck of 18 t, 9000 kg empty, J1939, about 95 min",
-    "truck-calibration": "the truck in all gears, loads and engine speeds",
-}
+ABOUT: Final[dict[str, str]] = _LISTED["about"]
 """One line for each named scenario."""
 
 

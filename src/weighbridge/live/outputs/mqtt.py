@@ -8,17 +8,16 @@ import math
 import re
 import secrets
 import sqlite3
-import tomllib
 import unicodedata
 from collections.abc import Collection
 from dataclasses import dataclass, field
-from importlib.resources import files
 from pathlib import Path
 from threading import Condition, Event, Thread
 from time import monotonic
 from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import unquote, urlsplit
 
+from weighbridge.data import toml_of
 from weighbridge.errors import ConfigError, MissingExtraError, WeighbridgeError
 from weighbridge.live.outputs.lines import json_line
 from weighbridge.live.outputs.outbox import MOST, Outbox
@@ -162,8 +161,7 @@ class Topics:
         ----------
         Home Assistant, MQTT integration, device discovery payload.
         """
-        text = files("weighbridge.live.outputs").joinpath("homeassistant.toml")
-        listed = tomllib.loads(text.read_text(encoding="utf-8"))
+        listed = toml_of("live.outputs", "homeassistant.toml")
         listed["reasons"]["json_attributes_topic"] = self.weighing
         entities = {}
         for key, entity in listed["entity"].items():

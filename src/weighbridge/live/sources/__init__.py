@@ -6,12 +6,11 @@ names a `weighbridge.live.sources.kind.SourceKind`.
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Sequence
-from importlib.resources import files
 from typing import Any, Final
 
 from weighbridge.arguments import near_miss
+from weighbridge.data import toml_of
 from weighbridge.errors import ConfigError
 from weighbridge.first_use import at_first_call
 from weighbridge.io.dbc import DbcSource
@@ -28,9 +27,7 @@ def _kind(name: str, *, make: str, **others: Any) -> SourceKind:
     return SourceKind(name=name, make=at_first_call(f"{__name__}.{make}"), **others)
 
 
-_LISTED: Final = tomllib.loads(
-    files("weighbridge.live.sources").joinpath("kinds.toml").read_text(encoding="utf-8")
-)
+_LISTED: Final = toml_of("live.sources", "kinds.toml")
 
 SOURCES: Final[Registry[SourceKind]] = Registry(
     SourceKind, GROUP, tuple(_kind(name, **record) for name, record in _LISTED.items())
