@@ -90,7 +90,7 @@ def live(
     from weighbridge.errors import ConfigError
     from weighbridge.live import Feed, Outputs, Session, order_file
     from weighbridge.live.clock import at_rate
-    from weighbridge.live.keys import keys
+    from weighbridge.live.orders import keys
     from weighbridge.vehicle import Vehicle
 
     _refuse_options(source, replay, every, ticket, out)
@@ -337,8 +337,7 @@ def _alerts(above: float | None, below: float | None, car: Vehicle) -> list[Aler
 def _run(session: Session, pressed: Callable[[], str], ordered: OrderFile | None) -> LiveWeighing:
     """Weigh until the sources end, somebody says so, or the process is asked to end."""
     from weighbridge.live import order
-    from weighbridge.live.keys import ORDER_OF
-    from weighbridge.live.orders import END
+    from weighbridge.live.orders import END, ORDER_OF
 
     stop = Event()
 

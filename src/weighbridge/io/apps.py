@@ -34,6 +34,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from weighbridge.data import toml_of
 from weighbridge.errors import DriveError
 from weighbridge.io.channels import Recording
 from weighbridge.io.columns import bracketed_unit, dimension_of, unit_suffix
@@ -52,6 +53,8 @@ from weighbridge.io.tabular import read_mapped, taken
 from weighbridge.io.understood import plain_head, text_of
 from weighbridge.signals import QUANTITIES, UNITS, Floats, Problem
 
+_LISTED: Final = toml_of("io", "apps.toml")
+
 _Column = tuple[int, str, MappedSignal | None]
 
 
@@ -60,20 +63,6 @@ def _unknown(raw: RawTable) -> DriveError:
 
 
 # RaceChrono ---------------------------------------------------------------------------------------
-
-_RACECHRONO: Final = {
-    ("latitude", "gps"): "latitude",
-    ("longitude", "gps"): "longitude",
-    ("altitude", "gps"): "altitude",
-    ("speed", "gps"): "gnss_speed",
-    ("bearing", "gps"): "gnss_course",
-    ("accuracy", "gps"): "gnss_accuracy",
-    ("speed", "obd"): "vehicle_speed",
-    ("speed", "canbus"): "vehicle_speed",
-    ("rpm", "obd"): "engine_speed",
-    ("rpm", "canbus"): "engine_speed",
-}
-"""Quantity by name of the column and kind of source."""
 
 
 def is_racechrono(begin: bytes) -> bool:
@@ -109,7 +98,7 @@ def read_racechrono(path: Path, table: str | None, mapping: TableMapping | None)
     odd = []
     for k, name in enumerate(raw.names[1:], start=1):
         kind = sources[k].rsplit(":", 1)[-1].strip().lower()
-        quantity = _RACECHRONO.get((name.lower(), kind), "")
+        quantity = _LISTED["racechrono"].get(f"{name.lower()} {kind}", "")
         if not quantity or quantity in wanted:
             ignored.append(f"{name} ({kind})" if kind else name)
         elif (suffix := unit_suffix(units[k])) is not None and _fits(quantity, suffix):
@@ -137,23 +126,6 @@ def _fits(quantity: str, unit: str | None) -> bool:
 
 # Torque Pro ---------------------------------------------------------------------------------------
 
-_TORQUE_PRO: Final = (
-    ("longitude", "longitude", "deg"),
-    ("latitude", "latitude", "deg"),
-    ("gps speed", "gnss_speed", None),
-    ("horizontal dilution of precision", "hdop", ""),
-    ("altitude", "altitude", "m"),
-    ("bearing", "gnss_course", "deg"),
-    ("speed (obd)", "vehicle_speed", None),
-    ("engine rpm", "engine_speed", "rpm"),
-    ("engine load", "engine_load", "pct"),
-    ("throttle position(manifold)", "throttle", "pct"),
-    ("mass air flow rate", "mass_air_flow", None),
-    ("intake manifold pressure", "intake_pressure", None),
-    ("ambient air temp", "ambient_temperature", None),
-)
-"""Beginning of a column's name up to its unit, quantity, unit where the name has none."""
-
 
 def is_torque_pro(begin: bytes) -> bool:
     """Return whether a file begins as Torque Pro's track logs do."""
@@ -174,11 +146,11 @@ def read_torque_pro(path: Path, table: str | None, mapping: TableMapping | None)
     found: dict[str, MappedSignal] = {}
     for name in raw.names:
         plain = " ".join(name.lower().split())
-        for start, quantity, unit in _TORQUE_PRO:
+        for start, (quantity, *units) in _LISTED["torque_pro"].items():
             rest = plain.removeprefix(start).strip()
             if not plain.startswith(start) or (rest and not rest.startswith("(")):
                 continue
-            stated = bracketed_unit(name) or unit
+            stated = bracketed_unit(name) or next(iter(units), None)
             if stated is None:
                 stated = unit_suffix(rest.strip("() "))
             if quantity not in found and _fits(quantity, stated):
@@ -202,20 +174,6 @@ def read_torque_pro(path: Path, table: str | None, mapping: TableMapping | None)
 
 # Sensor Logger ------------------------------------------------------------------------------------
 
-_SENSOR_LOGGER: Final = {
-    "totalacceleration": tuple((a, f"accel_{a}", "mps2", False) for a in "xyz"),
-    "gyroscope": tuple((a, f"gyro_{a}", "radps", False) for a in "xyz"),
-    "location": (
-        ("latitude", "latitude", "deg", False),
-        ("longitude", "longitude", "deg", False),
-        ("altitude", "altitude", "m", False),
-        ("speed", "gnss_speed", "mps", True),
-        ("bearing", "gnss_course", "deg", True),
-        ("horizontalAccuracy", "gnss_accuracy", "m", True),
-    ),
-}
-"""By file: column, quantity, unit, and whether negative values are invalid."""
-
 
 def is_sensor_logger(begin: bytes) -> bool:
     """Return whether a file begins as Sensor Logger's do."""
@@ -229,15 +187,15 @@ def read_sensor_logger(path: Path, table: str | None, mapping: TableMapping | No
     Files of other sensors give no signals and a note.
     """
     log = Log(path, absolute=True)
-    known = _SENSOR_LOGGER.get(path.stem.lower())
+    known = _LISTED["sensor_logger"].get(path.stem.lower())
     if known is None:
         if path.stem.lower() == "accelerometer":
             log.problems.append(Problem.of("file.no_gravity", file=path.name))
         return log
     raw = read_text(path, TextFormat(separator=","))
-    places = ((quantity, raw.index(name), unit) for name, quantity, unit, _ in known)
+    places = ((quantity, raw.index(name), unit) for name, (quantity, unit, *_) in known.items())
     columns = taken(log, raw, {q: (k, unit, None) for q, k, unit in places if k is not None})
-    signed = {quantity for _, quantity, _, positive in known if not positive}
+    signed = {quantity for quantity, _, *positive in known.values() if not positive}
     columns = [(q, v if q in signed else np.where(v < 0.0, np.nan, v)) for q, v in columns]
     log.take(raw.numbers(0)[0] * 1e-9, [(q, v) for q, v in columns if np.isfinite(v).any()])
     return log
@@ -247,14 +205,6 @@ def read_sensor_logger(path: Path, table: str | None, mapping: TableMapping | No
 
 _LAP: Final = "Lap"
 _TIME: Final = "Elapsed Time (ms)"
-_TRACK_MODE: Final = {
-    "speed (mph)": ("vehicle_speed", "mph"),
-    "speed (kph)": ("vehicle_speed", "kmh"),
-    "speed (km/h)": ("vehicle_speed", "kmh"),
-    "latitude (decimal)": ("latitude", "deg"),
-    "longitude (decimal)": ("longitude", "deg"),
-    "throttle position (%)": ("accelerator_pedal", "pct"),
-}
 
 
 def is_track_mode(begin: bytes) -> bool:
@@ -272,7 +222,9 @@ def read_track_mode(path: Path, table: str | None, mapping: TableMapping | None)
     """
     raw = read_text(path, TextFormat(separator=","))
     log = Log(path)
-    known = ((_TRACK_MODE.get(name.strip().lower()), k) for k, name in enumerate(raw.names))
+    known = (
+        (_LISTED["track_mode"].get(name.strip().lower()), k) for k, name in enumerate(raw.names)
+    )
     columns = dict(taken(log, raw, {e[0]: (k, e[1], None) for e, k in known if e}))
     if not columns:
         raise _unknown(raw)
@@ -311,22 +263,6 @@ def _session_time(laps: Floats, elapsed: Floats) -> Floats:
 
 _HEAD_LINES: Final = 20_000
 
-_HALTECH: Final = {
-    "EngineSpeed": (1.0, "rpm"),
-    "Percentage": (0.1, "%"),
-    "Pressure": (0.1, "kPa"),
-    "AbsPressure": (0.1, "kPa"),
-    "Temperature": (0.1, "k"),
-    "BatteryVoltage": (1e-3, "V"),
-    "Speed": (0.1, "km/h"),
-    "AFR": (1e-3, ""),
-    "Acceleration": (1e-3, "g"),
-    "AngularVelocity": (0.1, "deg/s"),
-    "Angle": (0.1, "deg"),
-    "Ratio": (1e-3, ""),
-}
-"""Value of one count of a type, and its unit."""
-
 
 def is_haltech(begin: bytes) -> bool:
     """Return whether a text begins as Haltech's logs do."""
@@ -364,6 +300,6 @@ def open_haltech(path: Path, time: TimeColumn) -> Recording:
     seconds, _, notes = time_seconds(raw, 0, 1.0, "clock")
     found = Recording([], of_day=True, notes=[*raw.notes, *notes])
     for k, (name, kind) in enumerate(zip(names, types, strict=True), start=1):
-        factor, unit = _HALTECH.get(kind, (1.0, ""))
+        factor, unit = _LISTED["haltech"].get(kind, (1.0, ""))
         found.add(raw, k, seconds, name, unit, factor)
     return found

@@ -1,11 +1,13 @@
-"""Orders by a file: for a scale that runs where nobody has a terminal."""
+"""What a person asks of a scale that runs: by a file or a pipe, and by keys at the terminal."""
 
 from __future__ import annotations
 
 import contextlib
 import os
+import select
 import stat
-from collections.abc import Iterator
+import sys
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Final
 
@@ -104,3 +106,44 @@ def order_file(path: Path | None) -> Iterator[OrderFile | None]:
         yield file
     finally:
         file.close()
+
+
+ORDER_OF: Final = {"t": TARE, "l": LOAD, "q": END}
+"""What a key asks for."""
+
+
+@contextlib.contextmanager
+def keys(wanted: bool) -> Iterator[Callable[[], str]]:
+    """Give a function that returns the keys pressed since it was called last.
+
+    Parameters
+    ----------
+    wanted : whether standard input is for keys; if not, or if it is no terminal, none come
+    """
+    if not wanted or not sys.stdin.isatty():
+        yield lambda: ""
+        return
+    try:
+        import termios
+        import tty
+    except ImportError:
+        # No terminal of Unix: the scale runs without keys.
+        yield lambda: ""
+        return
+    number = sys.stdin.fileno()
+    before = termios.tcgetattr(number)
+    tty.setcbreak(number)
+
+    def pressed() -> str:
+        found = ""
+        while select.select([number], [], [], 0.0)[0]:
+            key = sys.stdin.read(1)
+            if not key:
+                break
+            found += key
+        return found
+
+    try:
+        yield pressed
+    finally:
+        termios.tcsetattr(number, termios.TCSADRAIN, before)
