@@ -5,12 +5,15 @@ from __future__ import annotations
 import asyncio
 import concurrent.futures
 import contextlib
+import hashlib
+import os
 import queue
 import time
 import uuid
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Final
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from weighbridge.errors import ConfigError, WeighbridgeError
 from weighbridge.fleet.job import THERE, TRIES, Job, Receipt, fail_job, weigh_job
@@ -19,11 +22,6 @@ from weighbridge.messages import Problem
 
 if TYPE_CHECKING:
     from distributed import Client, Future
-
-import hashlib
-import os
-from pathlib import Path
-from typing import TypeVar
 
 PER_THREAD: Final = 4
 """Jobs in the cluster per thread: enough that none waits, few enough for the scheduler."""
@@ -301,20 +299,8 @@ def _of_the_network(error: BaseException) -> bool:
 
 def plain(count: Count) -> dict[str, Any]:
     """Return a count for `progress.json`."""
-    return {
-        name: getattr(count, name)
-        for name in (
-            "found",
-            "complete",
-            "done",
-            "there",
-            "failed",
-            "unread",
-            "drives",
-            "masses",
-            "workers",
-        )
-    } | {"rate_per_s": round(count.rate, 3), "left_s": count.left}
+    counted = {f.name: getattr(count, f.name) for f in fields(count) if f.name != "began"}
+    return counted | {"rate_per_s": round(count.rate, 3), "left_s": count.left}
 
 
 Result = TypeVar("Result")

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import struct
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,26 +21,18 @@ from weighbridge.errors import DriveError
 from weighbridge.io.frames import EXTENDED_MASK, Frames, in_order
 from weighbridge.io.log import Log
 from weighbridge.io.mapping import TableMapping
-from weighbridge.signals import Floats, Problem
+from weighbridge.signals import Problem
 from weighbridge.signals.words import counted
 
 _Bytes = NDArray[np.uint8]
-_Part = tuple[NDArray[np.int64], Frames]
 
-_CAN: Final = 1
-_CAN_2: Final = 86
 _CONTAINER: Final = 10
-_CAN_FD: Final = 100
-_CAN_FD_64: Final = 101
 _OBJECT: Final = int.from_bytes(b"LOBJ", "little")
 _HEADER: Final = 32
 _CONTAINER_HEADER: Final = 32
 _CONTAINER_LIMIT: Final = 1 << 26
 # Containers decoded together: enough for few numpy calls, few enough for little memory.
 _BATCH: Final = 1 << 24
-
-_REMOTE: Final = 0x80
-_REMOTE_FD_64: Final = 0x10
 
 
 def read_blf(path: Path, table: str | None, mapping: TableMapping | None) -> Log:
@@ -131,7 +123,7 @@ def _decode(batch: bytes, parts: list[Frames]) -> bytes:
     buffer = np.frombuffer(batch, np.uint8)
     at, end = _objects(buffer)
     kind = _number(buffer, at + 12, 4)
-    found = [d(buffer, at[kind == k]) for k, d in _DECODERS.items() if (kind == k).any()]
+    found = [_frames(buffer, at[kind == k], n) for k, n in _LAYOUTS.items() if (kind == k).any()]
     if found:
         # The objects of several kinds, back in the order they were written in.
         order = np.argsort(np.concatenate([a for a, _ in found]), kind="stable")
@@ -180,80 +172,53 @@ def _number(buffer: _Bytes, at: NDArray[np.int64], size: int) -> NDArray[np.int6
     return value.astype(np.int64)
 
 
-def _time(buffer: _Bytes, at: NDArray[np.int64]) -> Floats:
-    """Time stamps since the start of the log [s]."""
-    ten_micros = _number(buffer, at + 16, 4) == 1
-    return np.asarray(_number(buffer, at + 24, 8) * np.where(ten_micros, 1e-5, 1e-9))
+class _Layout(NamedTuple):
+    """Where an object of frames has what, in bytes after its header."""
+
+    fixed: int
+    flags: int
+    remote: int
+    channel_bytes: int
+    length: int
+    data: int
+    most: int
+
+
+_CLASSIC: Final = _Layout(fixed=16, flags=2, remote=0x80, channel_bytes=2, length=3, data=8, most=8)
+
+_LAYOUTS: Final = {
+    1: _CLASSIC,
+    86: _CLASSIC,
+    100: _Layout(fixed=84, flags=2, remote=0x80, channel_bytes=2, length=14, data=20, most=64),
+    101: _Layout(fixed=40, flags=12, remote=0x10, channel_bytes=1, length=2, data=40, most=64),
+}
+"""By the number of the object: CAN_MESSAGE, CAN_MESSAGE2, CAN_FD_MESSAGE, CAN_FD_MESSAGE_64."""
 
 
 def _frames(
-    buffer: _Bytes,
-    at: NDArray[np.int64],
-    channel: NDArray[np.int64],
-    identifier: NDArray[np.int64],
-    length: NDArray[np.int64],
-    begin: NDArray[np.int64],
-    width: int,
-) -> Frames:
-    """Frames of objects at ``at`` whose data begin at ``begin``."""
-    length = np.clip(length, 0, width)
-    columns = np.arange(width)
+    buffer: _Bytes, at: NDArray[np.int64], layout: _Layout
+) -> tuple[NDArray[np.int64], Frames]:
+    """Frames of the objects at ``at``, and where each of these stands."""
+    body = at + _number(buffer, at + 4, 2)
+    good = body + layout.fixed <= buffer.size
+    at, body = at[good], body[good]
+    # Remote frames carry no data.
+    good = buffer[body + layout.flags] & layout.remote == 0
+    at, body = at[good], body[good]
+    identifier = _number(buffer, body + 4, 4)
+    begin = body + layout.data
+    length = np.minimum(_number(buffer, body + layout.length, 1), layout.most)
+    if layout.data == layout.fixed:
+        # A frame may claim more bytes than its object holds; the others read as zero.
+        length = np.minimum(length, np.maximum(at + _number(buffer, at + 8, 4) - begin, 0))
+    columns = np.arange(layout.most)
     places = np.minimum(begin[:, None] + columns, buffer.size - 1)
-    return Frames(
-        _time(buffer, at),
-        channel.astype(np.int16),
+    ten_micros = _number(buffer, at + 16, 4) == 1
+    return at, Frames(
+        np.asarray(_number(buffer, at + 24, 8) * np.where(ten_micros, 1e-5, 1e-9)),
+        _number(buffer, body, layout.channel_bytes).astype(np.int16),
         (identifier & EXTENDED_MASK).astype(np.uint32),
         (identifier & 0x80000000) != 0,
         length.astype(np.uint8),
         np.where(columns < length[:, None], buffer[places], 0).astype(np.uint8),
     )
-
-
-def _can(buffer: _Bytes, at: NDArray[np.int64]) -> _Part:
-    at, body = _inside(buffer, at, 16)
-    at, body = _data_only(at, body, buffer[body + 2] & _REMOTE)
-    channel, identifier = _number(buffer, body, 2), _number(buffer, body + 4, 4)
-    length = _number(buffer, body + 3, 1)
-    return at, _frames(buffer, at, channel, identifier, length, body + 8, 8)
-
-
-def _can_fd(buffer: _Bytes, at: NDArray[np.int64]) -> _Part:
-    at, body = _inside(buffer, at, 84)
-    at, body = _data_only(at, body, buffer[body + 2] & _REMOTE)
-    channel, identifier = _number(buffer, body, 2), _number(buffer, body + 4, 4)
-    length = _number(buffer, body + 14, 1)
-    return at, _frames(buffer, at, channel, identifier, length, body + 20, 64)
-
-
-def _can_fd_64(buffer: _Bytes, at: NDArray[np.int64]) -> _Part:
-    at, body = _inside(buffer, at, 40)
-    at, body = _data_only(at, body, buffer[body + 12] & _REMOTE_FD_64)
-    channel, identifier = _number(buffer, body, 1), _number(buffer, body + 4, 4)
-    # A frame may claim more bytes than its object holds; the others read as zero.
-    room = np.maximum(at + _number(buffer, at + 8, 4) - (body + 40), 0)
-    length = np.minimum(_number(buffer, body + 2, 1), room)
-    return at, _frames(buffer, at, channel, identifier, length, body + 40, 64)
-
-
-def _data_only(
-    at: NDArray[np.int64], body: NDArray[np.int64], remote: NDArray[np.integer]
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Leave remote frames out: they carry no data."""
-    return at[remote == 0], body[remote == 0]
-
-
-def _inside(
-    buffer: _Bytes, at: NDArray[np.int64], size: int
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Where bodies begin, of the objects whose fixed part of ``size`` is in the buffer."""
-    body = at + _number(buffer, at + 4, 2)
-    good = body + size <= buffer.size
-    return at[good], body[good]
-
-
-_DECODERS: Final[dict[int, Callable[[_Bytes, NDArray[np.int64]], _Part]]] = {
-    _CAN: _can,
-    _CAN_2: _can,
-    _CAN_FD: _can_fd,
-    _CAN_FD_64: _can_fd_64,
-}

@@ -11,6 +11,7 @@ from weighbridge.errors import ConfigError, SourceError
 from weighbridge.io.obd import parameters_of
 from weighbridge.live.source import Samples
 from weighbridge.live.sources.elm_text import Reply, read_reply, read_voltage
+from weighbridge.live.sources.gathered import SLICE
 from weighbridge.live.sources.kind import SourceOptions, parted_rate
 from weighbridge.live.sources.links import BleLink, Link, SerialLink, tcp
 from weighbridge.live.sources.lock import DeviceLock
@@ -27,7 +28,6 @@ SETUP: Final = ("ATE0", "ATL0", "ATS0", "ATH1", "ATAT1", "ATSP0")
 _SEARCH: Final = 12.0
 _RESET: Final = 2.5
 _COMMAND: Final = 1.5
-_SLICE: Final = 0.1
 # Replies in a row that are damaged, until the adapter is set up anew, and until it is lost.
 _ANEW: Final = 5
 _LOST: Final = 10
@@ -229,13 +229,13 @@ class ElmCarrier:
         while (left := until - monotonic()) > 0.0:
             if self._stop.is_set():
                 raise _Stopped
-            said += self._link.read(min(left, _SLICE))
+            said += self._link.read(min(left, SLICE))
             if b">" in said:
                 return said.partition(b">")[0].decode("ascii", "replace")
             del said[:-_MOST_TEXT]
         # Any character breaks off what the adapter does; the next command finds it waiting.
         self._link.write(b"\r")
-        self._link.read(_SLICE)
+        self._link.read(SLICE)
         return None
 
     def _drain(self) -> None:

@@ -13,6 +13,9 @@ from weighbridge.live.source import Samples
 BLOCK: Final = 0.05
 """A block is handed over after so long: samples are shown that much later at most [s]."""
 
+SLICE: Final = 0.1
+"""A device is waited for so long, before it is looked whether to end [s]."""
+
 
 class Gathered:
     """Single samples on their way into blocks.

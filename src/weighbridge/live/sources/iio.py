@@ -15,7 +15,7 @@ from typing import Final
 from weighbridge.errors import ConfigError, SourceError
 from weighbridge.live.clock import now
 from weighbridge.live.source import Samples
-from weighbridge.live.sources.gathered import BLOCK, Gathered
+from weighbridge.live.sources.gathered import BLOCK, SLICE, Gathered
 from weighbridge.live.sources.iio_buffer import Buffer, UnbufferedError, buffered
 from weighbridge.live.sources.kind import SourceOptions, parted_rate
 
@@ -38,7 +38,6 @@ _HIGHEST_RATE: Final = 500
 _KINDS: Final = {"accel": "accel", "anglvel": "gyro"}
 _MOST_TEXT: Final = 64
 _FAILURES: Final = 20
-_SLICE: Final = 0.1
 
 
 def make_iio(text: str, options: SourceOptions) -> IioSource:
@@ -127,7 +126,7 @@ class IioSource:
         """
         came, heard = False, monotonic()
         while not stop.is_set():
-            times, raw = buffer.read(_SLICE)
+            times, raw = buffer.read(SLICE)
             for k, time in enumerate(times):
                 gathered.add(time, {c.name: c.value(float(raw[c.element][k])) for c in channels})
             gathered.flush(BLOCK)

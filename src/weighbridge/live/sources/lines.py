@@ -19,7 +19,7 @@ from weighbridge.io.columns import UnitlessColumnError, near_column, parse_colum
 from weighbridge.live.clock import now
 from weighbridge.live.device_clock import DeviceClock
 from weighbridge.live.source import Samples
-from weighbridge.live.sources.gathered import BLOCK, Gathered
+from weighbridge.live.sources.gathered import BLOCK, SLICE, Gathered
 from weighbridge.live.sources.kind import SourceOptions, checked_port
 from weighbridge.signals import scalar_to_si
 
@@ -32,7 +32,6 @@ LONGEST: Final = 65_536
 """Bytes of a line at most."""
 
 _AXES: Final = ("accel", "gyro")
-_SLICE: Final = 0.1
 
 
 def make_lines(text: str, options: SourceOptions) -> LinesSource:
@@ -90,7 +89,7 @@ def _standard_input() -> Iterator[Callable[[], bytes | None]]:
     number = sys.stdin.fileno()
 
     def read() -> bytes | None:
-        if not select.select([number], [], [], _SLICE)[0]:
+        if not select.select([number], [], [], SLICE)[0]:
             return b""
         return os.read(number, LONGEST) or None
 
@@ -113,7 +112,7 @@ def _datagrams(host: str, port: int) -> Iterator[Callable[[], bytes]]:
             raise SourceError(
                 f"lines:udp:{host}:{port} cannot be used ({error}); is another program at it?"
             ) from error
-        opened.settimeout(_SLICE)
+        opened.settimeout(SLICE)
 
         def read() -> bytes:
             try:

@@ -10,14 +10,12 @@ from typing import Final, Protocol
 
 from weighbridge.live.clock import now
 from weighbridge.live.source import Samples
-from weighbridge.live.sources.gathered import BLOCK, Gathered
+from weighbridge.live.sources.gathered import BLOCK, SLICE, Gathered
 from weighbridge.live.sources.links import Link
 from weighbridge.live.sources.lock import DeviceLock
 
 SILENT: Final = 5.0
 """A receiver that sends nothing with a fix for so long has a trouble [s]."""
-
-_SLICE: Final = 0.1
 
 
 class FixReader(Protocol):
@@ -79,7 +77,7 @@ class ReceiverSource:
         heard = monotonic()
         fixed = heard
         while not stop.is_set():
-            data = link.read(_SLICE)
+            data = link.read(SLICE)
             if data:
                 heard = monotonic()
             for time, values in reader.read(data, now()):

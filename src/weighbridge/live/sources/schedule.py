@@ -11,9 +11,6 @@ from weighbridge.signals import scalar_to_si
 _SPEED, _ENGINE_SPEED, _LOAD, _TORQUE = 0x0D, 0x0C, 0x04, 0x62
 _THROTTLE, _PRESSURE, _AIR_FLOW = 0x11, 0x0B, 0x10
 
-MOST_FAST: Final = 4
-"""Parameters asked for in turn at most; the others are asked for seldom."""
-
 # Of each row the first that the vehicle has is asked for in turn.
 _FAST: Final = (
     (_SPEED,),
