@@ -45,7 +45,8 @@ def emulate(
         for kind, words in _WITHOUT.items():
             if not any(source.startswith(kind) for source in sources):
                 notice(words)
-        say("weighbridge live --vehicle VEHICLE.toml" + _options(sources, rate))
+        live = ["weighbridge live --vehicle VEHICLE.toml", *(f"--source {s}" for s in sources)]
+        say(" ".join(live if rate == 1.0 else [*live, f"--rate {rate:g}"]))
         notice("the vehicle begins to drive when this is typed in another terminal")
         with _Progress(played) as progress:
             while not played.ended:
@@ -90,8 +91,3 @@ def progress_text(played: Played) -> str:
 
 def _clock(seconds: float) -> str:
     return f"{int(seconds) // 60}:{int(seconds) % 60:02d}"
-
-
-def _options(sources: list[str], rate: float) -> str:
-    words = "".join(f" --source {source}" for source in sources)
-    return words if rate == 1.0 else f"{words} --rate {rate:g}"

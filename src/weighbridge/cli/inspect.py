@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
-    from weighbridge.pipeline.inspection import Inspection, Way
+    from weighbridge.pipeline.inspection import Inspection
     from weighbridge.vehicle import Vehicle
 
 # Width of tables where no terminal gives one.
@@ -276,12 +276,7 @@ def _way_table(found: Inspection, every_way: bool) -> Table:
         table.add_column(name)
     for w in ways:
         mark = " (weigh goes this way)" if w.chosen else ""
-        cells = (w.name + mark, _expected(w), w.because if w.possible else "", ", ".join(w.needs))
+        known = (w.accuracy, w.because) if w.possible else ("", "")
+        cells = (w.name + mark, *known, ", ".join(w.needs))
         table.add_row(*cells[: len(names)])
     return table
-
-
-def _expected(way: Way) -> str:
-    if not way.possible:
-        return ""
-    return way.accuracy

@@ -148,7 +148,9 @@ class _Run:
         try:
             with scheduler_needed(self._client):
                 while self._fill() or self._inside or not self.count.complete:
-                    self._look_ahead()
+                    until = time.monotonic() + _LOOK
+                    while time.monotonic() < until and self._find():
+                        pass
                     self._collect(self._suspects)
                     self._reported()
                 for job in self._suspects:
@@ -193,11 +195,6 @@ class _Run:
         else:
             self._waiting.append(job)
         return True
-
-    def _look_ahead(self) -> None:
-        until = time.monotonic() + _LOOK
-        while time.monotonic() < until and self._find():
-            pass
 
     def _measure(self) -> None:
         """Let the window follow the cluster's size."""

@@ -179,11 +179,6 @@ def _later(minutes: float, since: float, wait: float) -> float:
     return max(minutes - since / 60.0, wait / 60.0)
 
 
-def _allowed(half: float, mass: float, floor: float) -> float:
-    """Variance of the noise with which the interval is as narrow [kg^2]; negative if never."""
-    return (half * mass / _REACH) ** 2 - (floor * mass) ** 2
-
-
 def _minutes(half: float, mass: float, noise: float, floor: float, driven: float) -> float:
     """Time on the move until the interval is as narrow [min].
 
@@ -191,7 +186,8 @@ def _minutes(half: float, mass: float, noise: float, floor: float, driven: float
     """
     if math.isinf(noise):
         return math.nan
-    allowed = _allowed(half, mass, floor)
+    # Variance of the noise with which the interval is as narrow [kg^2]; negative if never.
+    allowed = (half * mass / _REACH) ** 2 - (floor * mass) ** 2
     if noise <= allowed:
         return 0.0
     longest = driven * (noise / allowed - 1.0) if allowed > 0.0 else math.inf

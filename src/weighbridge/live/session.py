@@ -75,7 +75,10 @@ class Session:
                     if self.recorder is not None:
                         self.recorder.put(samples)
                     self.scale.update_block(samples)
-                    self._renew()
+                    if self.feed.renewed > self._renewed:
+                        # A device was turned on again.
+                        self._renewed = self.feed.renewed
+                        self.scale.renew()
                     self._show()
                     if stop.is_set():
                         break
@@ -127,12 +130,6 @@ class Session:
         self.outputs.show(
             replace(weighing, alerts=states, problems=(*reported, *weighing.problems))
         )
-
-    def _renew(self) -> None:
-        """Inform the scale of a device that was turned on again."""
-        if self.feed.renewed > self._renewed:
-            self._renewed = self.feed.renewed
-            self.scale.renew()
 
     def _silence(self) -> float:
         """Time since any sample came [s]; 0 while some come."""

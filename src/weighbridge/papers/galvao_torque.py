@@ -141,7 +141,9 @@ def torque_table(done: TorqueTrial) -> Table:
                 f"{100.0 * done.errors(way)[k]:+.1f}" if known else "",
             ]
         rows.append((name, f"{done.masses[k]:.0f}", *cells))
-    per_load = [cell for way in done.ways for cell in (_per_load(done, way), "")]
+    per_load = [
+        cell for way in done.ways for cell in ("{:+.2f} ± {:.2f}".format(*done.slope(way)), "")
+    ]
     rows.append(("kg found per kg loaded", "", *per_load))
     heads = [head for way in done.ways for head in (f"{way}: kg", "error %")]
     return Table(
@@ -149,10 +151,6 @@ def torque_table(done: TorqueTrial) -> Table:
         ("drive", "true kg", *heads),
         tuple(rows),
     )
-
-
-def _per_load(done: TorqueTrial, way: str) -> str:
-    return "{:+.2f} ± {:.2f}".format(*done.slope(way))
 
 
 def torque_figures(done: TorqueTrial) -> dict[str, Found]:

@@ -31,8 +31,9 @@ def remarks(texts: Sequence[str]) -> str:
 
 def text_table(table: Table) -> str:
     """Return a table of texts: numbers to the right, the first column and sentences to the left."""
+    # A cell of more than 24 letters is a sentence rather than a number with its unit.
     kinds = [
-        "w" if any(_wordy(row[k]) for row in table.rows) else "n" if k else ""
+        "w" if any(len(row[k]) > 24 for row in table.rows) else "n" if k else ""
         for k in range(len(table.columns))
     ]
     return html_table(
@@ -41,11 +42,6 @@ def text_table(table: Table) -> str:
         [list(zip(row, kinds, strict=True)) for row in table.rows],
         table.marked,
     )
-
-
-def _wordy(cell: str) -> bool:
-    """Whether a cell is a sentence rather than a number with its unit."""
-    return len(cell) > 24
 
 
 def html_table(

@@ -168,7 +168,9 @@ def _write_day(part: Path, day: PlannedDay) -> _Made:
         drive = replace(with_fault(read, fault), info=info)
         write_drive(drive, part / inside, "parquet")
         if fault == "broken file":
-            _break(part / inside / "obd.parquet")
+            # Cut in half, as a logger without power does.
+            cut = part / inside / "obd.parquet"
+            cut.write_bytes(cut.read_bytes()[: cut.stat().st_size // 2])
         for leg in _legs(made):
             rows.append(
                 leg
@@ -206,8 +208,3 @@ def _legs(made: SimulatedDrive) -> list[dict[str, Any]]:
         {"leg": k, "start_s": a, "end_s": b, "mass_kg": round(float(np.interp(a, time, mass)), 1)}
         for k, (a, b) in enumerate(zip(begins, ends, strict=True))
     ]
-
-
-def _break(path: Path) -> None:
-    """Cut a file in half, as a logger without power does."""
-    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
