@@ -4,22 +4,18 @@ from __future__ import annotations
 
 import logging
 import math
-import shlex
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Final
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
 
 from weighbridge.errors import ConfigError, DriveError
 from weighbridge.io import tabular
 from weighbridge.io.clocks import settle_clocks, shift_clock
 from weighbridge.io.dbc import Database, DbcSource, load_dbcs
-from weighbridge.io.draft_text import HEAD_LINES, text_format
 from weighbridge.io.filled_positions import true_fixes
 from weighbridge.io.format import Format, Takes
 from weighbridge.io.formats import format_of, is_log, suffixes, unreadable
@@ -37,15 +33,12 @@ from weighbridge.io.mapping import (
     named_dbcs,
     none_fits,
 )
-from weighbridge.io.naming import recognise_all
 from weighbridge.io.parquet import read_parquet
 from weighbridge.io.parts import part_folders, read_parts
 from weighbridge.io.paths import given_paths, is_folder
 from weighbridge.io.quiet import PARSE_ERRORS, first_line
 from weighbridge.io.repeats import joined_signal, settle_repeats
-from weighbridge.io.table import head, read_text, start_text
-from weighbridge.io.understood import cells
-from weighbridge.messages import phrase
+from weighbridge.io.table import read_text, start_text
 from weighbridge.signals import (
     NO_DRIVE,
     QUANTITIES,
@@ -266,6 +259,8 @@ def _read_known(
     source = mappings[0].source if mappings else ""
     others = [f for f in there if f not in {path for path, _ in known}]
     if logs and others:
+        from weighbridge.io.left_out import left_out
+
         logs[0].problems += left_out(folder, others, source)
     return logs
 
@@ -507,46 +502,3 @@ def _rebase(logs: Sequence[Log], info: DriveInfo) -> DriveInfo:
     for log in absolute:
         shift_clock(log, -start)
     return info if info.start_time is not None else replace(info, start_time=start_text(start))
-
-
-_FEWEST: Final = 2
-"""Columns of a table that are known by their names, from which on it looks like a log."""
-
-_OWN: Final = ("std_kg", "sprung_mass_std_kg", "payload_low95_kg")
-"""Columns of results of ours, which no log has."""
-
-
-def left_out(folder: Path, files: Sequence[Path], mapping: str) -> Iterator[Problem]:
-    """Report tables that no one has described.
-
-    Parameters
-    ----------
-    folder : of the drive
-    files : in it, that were not read
-    mapping : the mapping that the others were read with; empty for none
-    """
-    for path in files:
-        if not _looks_like_a_log(path):
-            continue
-        why = phrase("no_pattern_fits", mapping=mapping) if mapping else phrase("names_of_its_own")
-        yield Problem.of("file.not_read", file=path.name, why=why, folder=shlex.quote(str(folder)))
-
-
-def _looks_like_a_log(path: Path) -> bool:
-    """Whether the header of a table names quantities; a result of ours, or no table, does not."""
-    try:
-        if path.suffix.lower() in (".parquet", ".pq"):
-            names = list(pq.read_schema(path).names)
-        elif path.suffix.lower() in (".csv", ".txt", ".tsv"):
-            text, _ = text_format(path)
-            lines = head(path, HEAD_LINES)
-            names = cells(lines[text.skip_rows], text.separator or ",")
-        else:
-            # An array is one of many, and which are of use the mapping says.
-            return path.suffix.lower() != ".npy"
-    except (DriveError, OSError, pa.ArrowException):
-        return False
-    if set(names) & set(_OWN):
-        return False
-    known = {named.quantity for named in recognise_all(names)} - {""}
-    return len(known) >= _FEWEST
