@@ -26,6 +26,12 @@ def test_a_page_is_its_template_with_figures(study):
     assert re.fullmatch(pattern, page, re.DOTALL)
 
 
+def test_the_page_of_widths_is_what_its_program_makes(monkeypatch):
+    monkeypatch.syspath_prepend(HOME / "studies")
+    page = (HOME / "studies/width.md").read_text(encoding="utf-8")
+    assert page == import_module("width").page()
+
+
 def test_the_parts_whose_worth_is_measured_are_in_the_program(monkeypatch):
     for place in (HOME, HOME / "studies"):
         monkeypatch.syspath_prepend(place)
