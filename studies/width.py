@@ -33,6 +33,9 @@ GROUPS: Final = {
 }
 """Slices of undamaged drives, as patterns."""
 
+FAR: Final = 0.05
+"""Error beyond which a mass is far off [-]."""
+
 HALF: Final = 1.96
 """Half of a 95 % interval [standard deviations]."""
 
@@ -84,8 +87,20 @@ def rows() -> list[str]:
     return lines
 
 
+def far_off() -> str:
+    """Say how many undamaged drives are far off, and how many of them beyond their interval."""
+    table = pl.read_csv(TABLE, infer_schema_length=None).filter(
+        pl.col("sound") & (pl.col("status") == "converged") & pl.col("true_kg").is_not_null()
+    )
+    off = (table["mass_kg"] - table["true_kg"]).abs()
+    far = off > FAR * table["true_kg"]
+    beyond = far & (off > HALF * table["std_kg"])
+    return f"{far.sum()} of {table.height}, {beyond.sum()} of them beyond their interval"
+
+
 def page() -> str:
-    return filled(HERE / "width.template.md", {"rows": "\n".join(rows())})
+    figures = {"rows": "\n".join(rows()), "far": far_off()}
+    return filled(HERE / "width.template.md", figures)
 
 
 if __name__ == "__main__":
