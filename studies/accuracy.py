@@ -129,7 +129,7 @@ def table(outcomes: list[Outcome]) -> str:
     return "\n".join(lines)
 
 
-def tell_methods(done: Rows) -> str:
+def write_methods(done: Rows) -> str:
     return table([outcome for _, part in done for outcome in part])
 
 
@@ -139,7 +139,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=FIRST_SEED, help="of the table of methods")
     given = parser.parse_args()
     methods = Part(
-        tuple((given.seed, n) for n in range(len(KINDS))), weigh_all, tell_methods, filed=False
+        tuple((given.seed, n) for n in range(len(KINDS))), weigh_all, write_methods, filed=False
     )
     parts = {"table": methods, **PARTS}
     if given.part:

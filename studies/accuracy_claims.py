@@ -1,7 +1,7 @@
 """What the joint estimator is meant to stand: wind, other loggers, loading, no calibration.
 
 Each part draws its vehicles and drives from seeds of `FIRST` up, used in no tuning, and
-tells its figures in words and a table. `accuracy.py` runs them.
+writes its figures as words and a table. `accuracy.py` runs them.
 """
 
 from __future__ import annotations
@@ -200,7 +200,7 @@ def wind_job(number: int, vehicle: Vehicle) -> list[OutAndBack]:
     return found
 
 
-def tell_wind(done: Rows) -> str:
+def write_wind(done: Rows) -> str:
     rows = [row for _, part in done for row in part]
     lines = [
         "| wind m/s | trip | trips | difference out − back: RMS % | mean % | 95th % | worst % "
@@ -313,7 +313,7 @@ def logger_job(number: int) -> list[dict[str, tuple[float, float]]]:
     return found
 
 
-def tell_logger(done: Rows) -> str:
+def write_logger(done: Rows) -> str:
     lines = [
         "| vehicle | logger | file of the usual logger: mean moves by % | standard error % "
         "| its own file: mean moves by % | standard error % | RMS error %, its own file |",
@@ -401,7 +401,7 @@ def loading_job(number: int, vehicle: Vehicle) -> list[Loaded]:
     return found
 
 
-def tell_loading(done: Rows) -> str:
+def write_loading(done: Rows) -> str:
     rows = [row for _, part in done for row in part]
     lines = [
         "| vehicle | drives | within 3 % after 90 s | in the track of the whole drive "
@@ -486,7 +486,7 @@ def data_sheet(car: SimulatedCar, rng: np.random.Generator, idle: float | None) 
 
 
 def idle_reading(drive: Drive) -> float:
-    """Torque that the engine reads standing at idle, as `inspect` tells it [-]."""
+    """Torque that the engine reads standing at idle, by `inspect` [-]."""
     torque, speed = drive.signals["engine_torque_fraction"], drive.signals["vehicle_speed"]
     still = np.all([np.abs(speed.at(torque.time + s)) < 0.3 for s in (-2.0, 0.0, 2.0)], axis=0)
     return float(np.percentile(torque.values[still], 10.0))
@@ -539,7 +539,7 @@ def data_sheet_job(number: int) -> list[Uncalibrated]:
     return found
 
 
-def tell_data_sheet(done: Rows) -> str:
+def write_data_sheet(done: Rows) -> str:
     rows = [row for _, part in done for row in part]
     lines = [
         "| vehicle | torque read | drives | RMS % | mean % | 95th % | worst % | within 5 % "
@@ -603,13 +603,13 @@ def cruise_job(number: int, vehicle: Vehicle) -> list[Cruise]:
         for begin in (0.0, 150.0):
             try:
                 w = weigh(drive.between(begin, 150.0 + CRUISE), vehicle)
-            except DriveError as told:
+            except DriveError as refusal:
                 found.append(
                     Cruise(
                         kind,
                         SPEED_STEPS[k % 2],
                         begin == 0.0,
-                        f"refused: {told}",
+                        f"refused: {refusal}",
                         math.nan,
                         math.nan,
                         True,
@@ -632,7 +632,7 @@ def cruise_job(number: int, vehicle: Vehicle) -> list[Cruise]:
     return found
 
 
-def tell_cruise(done: Rows) -> str:
+def write_cruise(done: Rows) -> str:
     rows = [row for _, part in done for row in part]
     lines = [
         "| recorded | drives | refused as bad data | not_excited | weighed, interval holds "
@@ -683,7 +683,7 @@ def start_job(number: int, vehicle: Vehicle) -> list[tuple[float, ...]]:
     return found
 
 
-def tell_start(done: Rows) -> str:
+def write_start(done: Rows) -> str:
     rows = np.array([row for _, part in done for row in part])
     moved = rows - rows[:, 1:2]
     lines = [
@@ -802,7 +802,7 @@ def overload_figures(rows: Sequence[InCondition]) -> list[str]:
     return lines
 
 
-def tell_conditions(done: Rows) -> str:
+def write_conditions(done: Rows) -> str:
     rows = [row for _, part in done for row in part]
     usual = {(r.number, k): r.error for r, k in _numbered(rows, "ordinary")}
     lines = [
@@ -829,8 +829,10 @@ def tell_conditions(done: Rows) -> str:
         true = np.array([r.mass for r in own])
         slope = np.polyfit(true, true * (1.0 + np.array([r.error for r in own])), 1)[0]
         gains.setdefault(own[0].kind, []).append(f"{slope:.3f}")
-    told = "; ".join(f"{kind} {', '.join(many)}" for kind, many in gains.items())
-    return "\n".join([*lines, "", f"Gain of load by vehicle: {told}.", "", *overload_figures(rows)])
+    by_kind = "; ".join(f"{kind} {', '.join(many)}" for kind, many in gains.items())
+    return "\n".join(
+        [*lines, "", f"Gain of load by vehicle: {by_kind}.", "", *overload_figures(rows)]
+    )
 
 
 def _numbered(rows: Sequence[InCondition], condition: str) -> Iterator[tuple[InCondition, int]]:
@@ -844,35 +846,35 @@ def _numbered(rows: Sequence[InCondition], condition: str) -> Iterator[tuple[InC
 
 @dataclass(frozen=True)
 class Part:
-    """One claim: what is to be done, how, and how its figures are told.
+    """One claim: what is to be done, how, and how its figures are written.
 
     Attributes
     ----------
     jobs : numbers of vehicles, or what else ``work`` is given
     work : makes rows of figures of a job, and of the vehicle's file where it is ``filed``
-    tell : writes the figures of all jobs
+    write : writes the figures of all jobs
     filed : whether vehicles calibrated by ordinary drives are weighed
     """
 
     jobs: tuple[Any, ...]
     work: Callable[..., list[Any]]
-    tell: Callable[[Rows], str]
+    write: Callable[[Rows], str]
     filed: bool = True
 
 
 PARTS: Final[dict[str, Part]] = {
-    "logger": Part((1, 3), logger_job, tell_logger, filed=False),
-    "wind": Part(tuple(n for n in range(12) if n % 6 != 5), wind_job, tell_wind),
-    "loading": Part(tuple(range(6)), loading_job, tell_loading),
-    "data-sheet": Part(UNCALIBRATED, data_sheet_job, tell_data_sheet, filed=False),
-    "cruise": Part(tuple(range(6)), cruise_job, tell_cruise),
-    "start": Part(tuple(range(6)), start_job, tell_start),
-    "conditions": Part(tuple(range(12)), condition_job, tell_conditions),
+    "logger": Part((1, 3), logger_job, write_logger, filed=False),
+    "wind": Part(tuple(n for n in range(12) if n % 6 != 5), wind_job, write_wind),
+    "loading": Part(tuple(range(6)), loading_job, write_loading),
+    "data-sheet": Part(UNCALIBRATED, data_sheet_job, write_data_sheet, filed=False),
+    "cruise": Part(tuple(range(6)), cruise_job, write_cruise),
+    "start": Part(tuple(range(6)), start_job, write_start),
+    "conditions": Part(tuple(range(12)), condition_job, write_conditions),
 }
 
 
 def run_parts(parts: Mapping[str, Part]) -> dict[str, str]:
-    """Return the figures of each part, as it tells them."""
+    """Return the figures of each part, as it writes them."""
     numbers = {n for part in parts.values() if part.filed for n in part.jobs}
     compile_all()
     files = dict(zip(numbers, shared_out([(vehicle_file, (n,)) for n in numbers]), strict=True))
@@ -882,7 +884,7 @@ def run_parts(parts: Mapping[str, Part]) -> dict[str, str]:
         for job in part.jobs
     ]
     rows = shared_out([do for _, _, do in work])
-    told: dict[str, Rows] = {name: [] for name in parts}
+    done: dict[str, Rows] = {name: [] for name in parts}
     for (name, job, _), found in zip(work, rows, strict=True):
-        told[name].append((job, found))
-    return {name: part.tell(told[name]) for name, part in parts.items()}
+        done[name].append((job, found))
+    return {name: part.write(done[name]) for name, part in parts.items()}

@@ -246,14 +246,14 @@ def faults() -> str:
     rows = []
     for name, parts in cases.items():
         rng = np.random.default_rng(FIRST_SEED + 1)
-        errors, held, reach, told, refused, blind_held = [], [], [], 0, 0, []
+        errors, held, reach, warned, refused, blind_held = [], [], [], 0, 0, []
         count = 20
         for k in range(count):
             made = simulate_ride(draw(rng, 500 + k, **{"duration": 30.0, **parts}))
             found = estimate_inertia(Drive("ride", made.drive.signals), car)
             true = made.inertias[-1]
             refused += found.status != "converged"
-            told += found.status != "converged" or bool(found.warnings)
+            warned += found.status != "converged" or bool(found.warnings)
             if found.status == "converged":
                 low, high = found.intervals()
                 errors.append(found.values / true - 1.0)
@@ -265,7 +265,7 @@ def faults() -> str:
                 blind_held.append((low <= true) & (true <= high))
         rms = three(100 * np.sqrt(np.nanmean(np.square(errors), axis=0)), ".1f") if errors else ""
         rows.append(
-            (name, f"{refused}", f"{told - refused}", rms,
+            (name, f"{refused}", f"{warned - refused}", rms,
              three(100 * np.nanmedian(reach, axis=0), ".1f") if reach else "",
              f"{np.sum(held)} of {np.size(held)}" if held else "",
              f"{np.sum(blind_held)} of {np.size(blind_held)}" if blind_held else "")

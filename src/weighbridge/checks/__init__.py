@@ -66,7 +66,7 @@ _CHECKS: Final[tuple[_Check, ...]] = (
 )
 
 _LAST: Final[tuple[_Check, ...]] = (check_vehicle, check_reading)
-"""What froze or dropped out is not held against the rest."""
+"""They compare what is left, without frozen values and dropouts."""
 
 
 def correct_drive(drive: Drive, vehicle: Vehicle | None = None) -> Drive:

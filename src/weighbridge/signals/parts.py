@@ -124,8 +124,8 @@ def longest_part(drive: Drive) -> Drive:
     return longest.with_problems(
         Problem.of(
             "clock.splices",
-            start=drive.start,
-            end=drive.end,
+            start=cuts[0].end,
+            end=cuts[-1].end,
             why=cuts[0].why,
             times=times,
             at=instant(cuts[0].end),
