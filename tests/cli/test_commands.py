@@ -64,6 +64,24 @@ def test_help_in_a_process_of_its_own_loads_no_arrays():
     assert done.stderr == "loaded: []\n"
 
 
+def test_a_weighing_loads_no_slow_library(car, loaded):
+    words = ["weigh", str(loaded.folder), "--vehicle", str(car), "--quiet"]
+    script = (
+        "import sys\n"
+        f"sys.argv = ['weighbridge', *{words!r}]\n"
+        "from weighbridge.cli.main import run\n"
+        "try:\n"
+        "    run()\n"
+        "finally:\n"
+        "    slow = {'scipy.linalg', 'scipy.optimize', 'scipy.signal', 'scipy.special', 'plotly'}\n"
+        "    print('loaded:', sorted(slow & set(sys.modules)), file=sys.stderr)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert done.returncode == 0
+    assert "kg, 95 %" in done.stdout
+    assert done.stderr == "loaded: []\n"
+
+
 def test_unknown_option_is_status_2(weighbridge):
     assert weighbridge("weigh", "--nonsense").code == 2
 

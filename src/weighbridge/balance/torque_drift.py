@@ -21,13 +21,13 @@ from weighbridge.messages import Problem, phrase, refused
 from weighbridge.navigation import BY_SPEED, Motion
 from weighbridge.signals import Drive, Floats, Signal, median_of_three, median_slope, spread
 from weighbridge.signals.interpolation import interpolate
-from weighbridge.signals.lag import best_lag
+from weighbridge.signals.lag import STEP, best_lag
 from weighbridge.vehicle import Vehicle, source_of
 
 PIECE: Final = 240.0
 """Force and motion are compared over so long [s], every half of it anew."""
 
-SHIFTS: Final[Floats] = 0.2 * np.arange(-10.0, 41.0)
+SHIFTS: Final[Floats] = STEP * np.arange(-10.0, 41.0)
 """Lags that are tried [s]."""
 
 AGREES: Final = 0.85
@@ -63,11 +63,12 @@ def force_lags(table: ForceTable, vehicle: Vehicle, motion: Motion) -> ForceLags
     force = table.traction_force - drag_force(table, vehicle)
     usable = table.usable & np.isfinite(force)
     found: list[tuple[float, float]] = []
-    if not table.time.size:
+    if table.time.size < 2:
         return ForceLags(np.empty(0), np.empty(0))
+    stride = max(1, round(STEP / float(np.median(np.diff(table.time)))))
     for begin in np.arange(table.time[0], table.time[-1] - 0.5 * PIECE, 0.5 * PIECE):
         first, last = np.searchsorted(table.time, (begin, begin + PIECE))
-        here = np.flatnonzero(usable[first:last]) + first
+        here = np.flatnonzero(usable[first:last])[::stride] + first
         if here.size < MANY:
             continue
         moved = interpolate(table.time[here] - SHIFTS[:, None], motion.time, specific)

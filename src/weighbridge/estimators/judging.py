@@ -9,7 +9,6 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import stdtrit
 
 from weighbridge.balance import ForceBalance, Reason, windows
 from weighbridge.balance.table import ForceTable
@@ -18,6 +17,7 @@ from weighbridge.estimators.track import MassTrack, Segment, Status
 from weighbridge.messages import Problem, phrase
 from weighbridge.navigation import BY_SPEED, Motion, MotionSource
 from weighbridge.signals import Bools, Floats
+from weighbridge.signals.student import student_quantile
 from weighbridge.vehicle import Vehicle, scale_std, source_of
 
 SLOW_TORQUE: Final = 1.5
@@ -200,7 +200,7 @@ class Evidence:
     def half_width(self) -> float:
         """Half of the interval of 95 % [kg]."""
         freedom = max(self.degrees_of_freedom, 1.0)
-        return float(stdtrit(freedom, 0.975)) * self.std
+        return student_quantile(freedom, 0.975) * self.std
 
     @property
     def drive_std(self) -> float:

@@ -13,7 +13,6 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize
 
 from weighbridge.balance import ForceBalance, Reason, law
 from weighbridge.balance.force_balance import highest_torque
@@ -44,6 +43,7 @@ from weighbridge.estimators.speed_samples import (
 from weighbridge.estimators.track import MassTrack
 from weighbridge.kernels import speed_torque_ekf as kernel
 from weighbridge.signals import Bools, Floats, resolution
+from weighbridge.signals.minimum import lowest_by_simplex
 from weighbridge.vehicle import Vehicle, by_data_sheet, cold_torque_std, scale_std
 from weighbridge.vehicle.data_sheet import offset_std
 
@@ -379,9 +379,7 @@ def _likeliest(
         return -likelihood + 0.5 * float(np.sum((some / LEVEL_STD) ** 2))
 
     first = levels[free]
-    simplex = first + np.vstack([np.zeros(first.size), 0.5 * np.eye(first.size)])
-    options = {"xatol": 0.03, "fatol": 0.1, "maxiter": 120, "initial_simplex": simplex}
-    return whole(minimize(misfit, first, method="Nelder-Mead", options=options).x)
+    return whole(lowest_by_simplex(misfit, first, np.full(first.size, 0.5), close=0.1)[0])
 
 
 def estimate(

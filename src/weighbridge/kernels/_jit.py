@@ -12,6 +12,7 @@ from numba.core.caching import (
     IndexDataCacheFile,
     UserWideCacheLocator,
 )
+from numba.core.runtime.nrt import rtsys
 from numba.misc.appdirs import AppDirs
 
 
@@ -83,7 +84,10 @@ class _Cache(FunctionCache):
     def load_overload(self, sig, target_context):
         """Load a compiled kernel; None where its file cannot be read."""
         try:
-            return super().load_overload(sig, target_context)
+            # Without numba's registries, which a compilation loads, and which take longer than all
+            # kernels of a weighing.
+            rtsys.initialize(target_context)
+            return self._load_overload(sig, target_context)
         # A file cut off is a pickle cut off, whose errors are of many kinds.
         except Exception:
             with contextlib.suppress(OSError):

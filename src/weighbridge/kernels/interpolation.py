@@ -190,15 +190,16 @@ def moved_changes(begins, ends, delay, time, integral, whole, width):
     """
     changes = interpolate(ends - delay, time, integral, integral[0], integral[-1])
     before = interpolate(begins - delay, time, integral, integral[0], integral[-1])
-    count = changes.size
+    count, kept = changes.size, 0
     for k in range(count):
         changes[k] = changes[k] - before[k] if whole[k] else 0.0
+        kept += whole[k]
     half = width // 2
     total = np.empty(count + 2 * half + 1)
     total[0] = 0.0
     for k in range(count + 2 * half):
         total[k + 1] = total[k] + changes[min(max(k - half, 0), count - 1)]
-    found = np.empty(np.count_nonzero(whole))
+    found = np.empty(kept)
     at = 0
     for k in range(count):
         if whole[k]:

@@ -73,6 +73,38 @@ def _update(x, cov, gain, error, spread):
 
 
 @kernel
+def gauss_markov(step, length, std):
+    """Integrate a first-order Gauss-Markov process over steps.
+
+    Parameters
+    ----------
+    step : (n,) in the unit of ``length``
+    length, std : how long the process lasts, and its standard deviation
+
+    Returns
+    -------
+    transition, process_cov : (n, 2, 2) of the integral and the process
+    """
+    n = step.size
+    transition, cov = np.zeros((n, 2, 2)), np.empty((n, 2, 2))
+    for i in range(n):
+        x = step[i] / length
+        keep = np.exp(-x)
+        transition[i, 0, 0] = 1.0
+        transition[i, 0, 1] = length * (1.0 - keep)
+        transition[i, 1, 1] = keep
+        # In short steps the difference loses its digits: there it is its series.
+        if x < 1e-2:
+            integral = 2.0 / 3.0 * x**3 * (1.0 - 0.75 * x)
+        else:
+            integral = 2.0 * x - 3.0 + 4.0 * keep - keep**2
+        cov[i, 0, 0] = std**2 * length**2 * integral
+        cov[i, 0, 1] = cov[i, 1, 0] = std**2 * length * (1.0 - keep) ** 2
+        cov[i, 1, 1] = std**2 * (1.0 - keep**2)
+    return transition, cov
+
+
+@kernel
 def log_likelihood(transition, process_cov, row, z, variance, x0, cov0):
     """Log-likelihood of the innovations, constant left out.
 

@@ -6,10 +6,10 @@ from collections.abc import Callable
 from typing import Final
 
 import numpy as np
-from scipy.optimize import minimize
 
 from weighbridge.kernels import rts
 from weighbridge.signals import Floats, Ints, Signal, resolution
+from weighbridge.signals.minimum import lowest_by_slopes
 
 _Model = tuple[Floats, Floats, float, Floats, Floats]
 """Transitions, process covariances, noise variance, first state and its covariance."""
@@ -54,39 +54,10 @@ and a filter divides by it."""
 _CLOSE: Final = 0.01
 """The search ends where a step gains less of the logarithm of the likelihood [-]."""
 
-_STEP: Final = 1e-4
-"""Of the logarithms, by which its slopes are found [-]."""
-
 
 def _stride(time: Floats) -> int:
     """Take every how-many-th sample, so that they are `THINNED` apart."""
     return max(1, round(THINNED * (time.size - 1) / max(float(time[-1] - time[0]), THINNED)))
-
-
-def _gauss_markov(step: Floats, length: float, std: float) -> tuple[Floats, Floats, Floats]:
-    """Integrate a first-order Gauss-Markov process over steps.
-
-    Returns
-    -------
-    transition, process_cov : (n, 2, 2) of the integral and the process
-    keep : (n,) what is left of the process
-    """
-    n = step.size
-    x = step / length
-    keep = np.exp(-x)
-    transition = np.zeros((n, 2, 2))
-    transition[:, 0, 0] = 1.0
-    transition[:, 0, 1] = length * (1.0 - keep)
-    transition[:, 1, 1] = keep
-    cov = np.zeros((n, 2, 2))
-    # The first one loses its digits in short steps: there it is its series.
-    integral = np.where(
-        x < 1e-2, 2.0 / 3.0 * x**3 * (1.0 - 0.75 * x), 2.0 * x - 3.0 + 4.0 * keep - keep**2
-    )
-    cov[:, 0, 0] = std**2 * length**2 * integral
-    cov[:, 0, 1] = cov[:, 1, 0] = std**2 * length * (1.0 - keep) ** 2
-    cov[:, 1, 1] = std**2 * (1.0 - keep**2)
-    return transition, cov, keep
 
 
 def _merged(stamps: Floats, values: Floats, time: Floats) -> tuple[Floats, Floats, Ints]:
@@ -123,20 +94,12 @@ def _smooth_likeliest(
     thin = stamps[::stride]
 
     def misfit(level: Floats) -> float:
-        """Of one measurement: so the first step of the search is of the size of the levels."""
         transition, cov, noise, start, spread = model(thin, level)
         var = np.full(thin.size, noise)
         likelihood = rts.log_likelihood(transition, cov, row, values[::stride], var, start, spread)
-        return float(-likelihood + 0.5 * np.sum((level / LEVEL_STD) ** 2)) / thin.size
+        return float(-likelihood + 0.5 * np.sum((level / LEVEL_STD) ** 2))
 
-    def with_slopes(level: Floats) -> tuple[float, list[float]]:
-        here = misfit(level)
-        return here, [(misfit(level + step) - here) / _STEP for step in _STEP * np.eye(levels)]
-
-    found = minimize(
-        with_slopes, np.zeros(levels), method="L-BFGS-B", jac=True,
-        bounds=[(-_FARTHEST, _FARTHEST)] * levels, options={"ftol": _CLOSE / thin.size},
-    ).x  # fmt: skip
+    found = lowest_by_slopes(misfit, np.zeros(levels), close=_CLOSE, farthest=_FARTHEST)
     clock, z, at = _merged(stamps, values, time)
     transition, cov, noise, start, spread = model(clock, found)
     x, var = rts.smooth(transition, cov, row, z, np.full(clock.size, noise), start, spread)
@@ -172,7 +135,7 @@ def smooth_speed(speed: Signal, time: Floats) -> tuple[Floats, Floats, Floats, F
 
     def model(clock: Floats, level: Floats) -> _Model:
         std, length, noise = np.exp(usual + level)
-        transition, cov, _ = _gauss_markov(np.diff(clock, prepend=clock[0]), length, std)
+        transition, cov = rts.gauss_markov(np.diff(clock, prepend=clock[0]), length, std)
         start = np.array([speed.values[0], 0.0])
         return transition, cov, noise**2, start, np.diag([noise**2, std**2])
 
@@ -216,7 +179,7 @@ def smooth_height(
     def model(clock: Floats, level: Floats) -> _Model:
         std, length, noise, walk, lasting = np.exp(usual + level)
         way = np.interp(clock, time, distance)
-        road, road_cov, _ = _gauss_markov(np.diff(way, prepend=way[0]), length, std)
+        road, road_cov = rts.gauss_markov(np.diff(way, prepend=way[0]), length, std)
         keep = np.exp(-np.diff(clock, prepend=clock[0]) / lasting)
         transition, cov = np.zeros((clock.size, 3, 3)), np.zeros((clock.size, 3, 3))
         transition[:, :2, :2], cov[:, :2, :2] = road, road_cov
@@ -252,7 +215,7 @@ def smooth_grade(measured: Signal, time: Floats, distance: Floats) -> tuple[Floa
     def model(clock: Floats, level: Floats) -> _Model:
         std, length, noise = np.exp(usual + level)
         way = np.interp(clock, time, distance)
-        transition, cov, _ = _gauss_markov(np.diff(way, prepend=way[0]), length, std)
+        transition, cov = rts.gauss_markov(np.diff(way, prepend=way[0]), length, std)
         return transition, cov, noise**2, np.zeros(2), np.diag([0.0, std**2])
 
     stamps, values = measured.time, measured.values

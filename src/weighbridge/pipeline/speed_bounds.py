@@ -9,10 +9,10 @@ import json
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from statistics import NormalDist
 from typing import Final
 
 import numpy as np
-from scipy.special import ndtri, stdtrit
 
 from weighbridge.arguments import check_all, check_number, check_type
 from weighbridge.balance.law import rotating_mass
@@ -23,6 +23,7 @@ from weighbridge.limits import SIGNIFICANT
 from weighbridge.navigation import Motion, find_motion, without_accelerometer
 from weighbridge.signals import Drive, Floats
 from weighbridge.signals.instants import instant
+from weighbridge.signals.student import student_quantile
 from weighbridge.vehicle import Vehicle, air_density
 from weighbridge.visible import visible_json
 
@@ -132,7 +133,7 @@ def mass_bound(
     start, gain, gain_std, force_work = (x[hard] for x in (start, gain, gain_std, force_work))
     most = (power * WINDOW - force_work) / gain
     std = np.hypot(power_std * power * WINDOW / gain, most * gain_std / gain)
-    bound = most + float(-ndtri(0.05 / most.size)) * std
+    bound = most + -NormalDist().inv_cdf(0.05 / most.size) * std
     best = int(np.argmin(bound))
     return MassBound(
         mass=float(bound[best]),
@@ -231,7 +232,7 @@ class CoastDown:
         return self._between(self.rolling, self.rolling_std, level)
 
     def _between(self, value: float, std: float, level: float) -> tuple[float, float]:
-        half = float(stdtrit(self.degrees_of_freedom, 0.5 + 0.5 * level)) * std
+        half = student_quantile(self.degrees_of_freedom, 0.5 + 0.5 * level) * std
         return value - half, value + half
 
     def to_json(self, name: str) -> str:

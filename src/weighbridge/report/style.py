@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from statistics import NormalDist
 from typing import Any, Final
 
 import numpy as np
 import plotly.graph_objects as go
-from scipy.special import ndtri
 
 from weighbridge.balance import REASON_TEXT, Reason
 from weighbridge.customary import shown_amount, shown_unit
@@ -25,7 +25,7 @@ BROWN: Final = "#a67c52"
 """Mid tones separated with any colour vision; after Okabe and Ito, Color Universal Design, 2008.
 Each has a contrast of 3 or more on light and dark paper (WCAG 2.2, 1.4.11)."""
 
-REACH: Final = float(ndtri(0.975))
+REACH: Final = NormalDist().inv_cdf(0.975)
 """Half of a 95 % interval over the standard deviation, where that is known [-]."""
 
 TIME_AXIS: Final = "Time since start [min]"

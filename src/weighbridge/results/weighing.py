@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from scipy.special import stdtrit
 
 from weighbridge.balance import REASON_TEXT, Reason
 from weighbridge.estimators import ESTIMATORS, Estimator, MassTrack, Segment, Status
@@ -18,6 +17,7 @@ from weighbridge.results.row import WeighingRow
 from weighbridge.results.writing import check_level, write_track
 from weighbridge.signals import Drive, Problem
 from weighbridge.signals.shown import in_html, in_lines, plural
+from weighbridge.signals.student import student_quantile
 from weighbridge.vehicle import Vehicle
 
 if TYPE_CHECKING:
@@ -129,7 +129,7 @@ class MassResult(Explained):
         check_level(level)
         if self.result is None or not math.isfinite(self.mass):
             return math.nan, math.nan
-        reach = float(stdtrit(self.result.degrees_of_freedom, 0.5 + 0.5 * level)) * self.std
+        reach = student_quantile(self.result.degrees_of_freedom, 0.5 + 0.5 * level) * self.std
         return self.mass - reach, self.mass + reach
 
     @property
@@ -168,7 +168,7 @@ class MassResult(Explained):
         if self.result is None:
             return pl.DataFrame(schema=dict.fromkeys(TRACK_COLUMNS, pl.Float64))
         r, table = self.result, self.result.balance.table
-        reach = float(stdtrit(r.degrees_of_freedom, 0.975)) * r.running_std
+        reach = student_quantile(r.degrees_of_freedom, 0.975) * r.running_std
         texts = np.array([REASON_TEXT[Reason(k)] for k in range(len(Reason))])
         columns = (
             r.time,

@@ -13,6 +13,7 @@ from weighbridge.signals.lag import (
     lowest,
     parabola,
 )
+from weighbridge.signals.minimum import lowest_by_simplex, lowest_by_slopes
 from weighbridge.signals.moving import moving_mean
 from weighbridge.signals.parts import find_restarts, find_splices, longest_part, numbered, parted
 from weighbridge.signals.recent import (
@@ -34,6 +35,7 @@ from weighbridge.signals.robust import (
     spread,
 )
 from weighbridge.signals.signal import Bools, Floats, Ints, Signal
+from weighbridge.signals.student import student_quantile
 from weighbridge.signals.units import (
     UNITS,
     Unit,
@@ -76,6 +78,8 @@ __all__ = [
     "lag_std_at",
     "longest_part",
     "lowest",
+    "lowest_by_simplex",
+    "lowest_by_slopes",
     "median_of_three",
     "median_slope",
     "moving_mean",
@@ -92,6 +96,7 @@ __all__ = [
     "spread",
     "spread_rows",
     "step_ends",
+    "student_quantile",
     "to_si",
     "unit",
 ]

@@ -6,21 +6,21 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-from scipy.optimize import minimize
 
 from weighbridge.estimators.joint.settings import JointSettings
 from weighbridge.estimators.joint.slow_errors import filter_params
 from weighbridge.estimators.squat import ResidualSquat
 from weighbridge.kernels import disturbance, load_change
 from weighbridge.signals import Bools, Floats
+from weighbridge.signals.minimum import lowest_by_simplex
 
 UNMODELLED: Final = 1.6
 """Errors of the mass over what the filter says of them, where no calibration has shown it [-]:
 simulated drives of one calibration scatter so around their mean, after five minutes as after an
 hour."""
 
-_TRIED: Final = np.array([[0.0, 0.0], [0.2, 0.0], [0.0, -1.0]])
-"""Logarithms of the levels that the search for the likeliest starts from [-]."""
+_STEPS: Final[Floats] = np.array([0.2, -1.0])
+"""First steps of the search for the likeliest logarithms of the levels [-]."""
 
 _CLOSE: Final = 0.03
 """It ends where they, and the logarithm of the likelihood, differ by less [-]."""
@@ -116,11 +116,8 @@ class Problem:
             state, *_ = self.changes(float(fast), float(slow))
             return float(-state.same.log_likelihood + 0.5 * np.sum(level**2))
 
-        found = minimize(
-            misfit, _TRIED[0], method="Nelder-Mead",
-            options={"initial_simplex": _TRIED, "xatol": _CLOSE, "fatol": _CLOSE},
-        )  # fmt: skip
-        fast, slow = np.exp(found.x)
+        level, _ = lowest_by_simplex(misfit, np.zeros(2), _STEPS, close=_CLOSE)
+        fast, slow = np.exp(level)
         return float(fast), float(slow)
 
     def mass_unchanged(self) -> float:

@@ -10,13 +10,13 @@ from dataclasses import dataclass, replace
 from typing import Final, TypeVar
 
 import numpy as np
-from scipy.optimize import OptimizeResult, minimize
 
 from weighbridge.balance.law import accessory_column
 from weighbridge.balance.table import ForceTable
 from weighbridge.estimators.joint.problem import Problem
 from weighbridge.kernels import disturbance, switched
 from weighbridge.signals import Floats
+from weighbridge.signals.minimum import lowest_by_simplex
 from weighbridge.vehicle import Vehicle
 
 Value = TypeVar("Value", float, Floats)
@@ -51,6 +51,9 @@ switches that were shown ended at -0.8 or more [-]."""
 
 CLOSE: Final = 0.05
 """A search ends where what is sought, and the logarithm of the likelihood, differ by less [-]."""
+
+STEPS: Final[Floats] = np.array([0.2, -0.3, 0.4])
+"""First steps of what is sought [-]."""
 
 SURE: Final = 6.0
 """Gain of the logarithm of the likelihood, prior included, that shows a switch: 50 drives of a
@@ -136,21 +139,16 @@ def find_switched(
     best = int(np.argmin(scores))
     if without - scores[best] < HOPELESS:
         return None
-    corners = tried[best] + np.vstack((np.zeros(3), np.diag([0.2, -0.3, 0.4])))
 
-    def stop_where_small(intermediate_result: OptimizeResult) -> None:
-        if intermediate_result.x[2] < SMALL and without - intermediate_result.fun < sure:
-            raise StopIteration
+    def is_small(level: Floats, score: float) -> bool:
+        return level[2] < SMALL and without - score < sure
 
-    found = minimize(
-        misfit, tried[best], method="Nelder-Mead", callback=stop_where_small,
-        options={"initial_simplex": corners, "xatol": CLOSE, "fatol": CLOSE},
-    )  # fmt: skip
-    gain = without - float(found.fun)
+    level, score = lowest_by_simplex(misfit, tried[best], STEPS, close=CLOSE, done=is_small)
+    gain = without - score
     if gain < sure:
         return None
-    power = power_of(float(found.x[2]))
-    on, _ = filtered(found.x, power)
+    power = power_of(float(level[2]))
+    on, _ = filtered(level, power)
     return Switched(power=power, time=problem.time, on=on, gain=gain)
 
 
