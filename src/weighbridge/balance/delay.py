@@ -10,12 +10,11 @@ from typing import Final
 import numpy as np
 
 from weighbridge.balance.averaging import WINDOW
-from weighbridge.balance.force_balance import force_rows
+from weighbridge.balance.force_balance import force_rows, usable_rows
 from weighbridge.balance.instants import in_band, lagged_motion
 from weighbridge.balance.law import force_on_mass
 from weighbridge.balance.table import ForceBalance
 from weighbridge.constants import GRAVITY
-from weighbridge.kernels.interpolation import distance_to_nearest
 from weighbridge.limits import CERTAIN, SIGNIFICANT
 from weighbridge.navigation import BY_SPEED, Motion
 from weighbridge.navigation.smoothing import smooth_speed
@@ -83,7 +82,7 @@ def estimate_torque_delay(
     DriveError
         The drive lacks what the torque source needs.
     """
-    misfit, _ = _misfit(drive, vehicle, motion, begun, -EARLIEST)
+    misfit, _ = _misfit(drive, vehicle, motion, begun, np.array([EARLIEST, -EARLIEST]))
     return find_lag(misfit, EARLIEST, LATEST, farthest=FARTHEST)
 
 
@@ -106,7 +105,7 @@ def clock_shift(drive: Drive, vehicle: Vehicle, motion: Motion, begun: ForceBala
     """
     known = begun.delay
     shifts = np.array([-0.8, -_NEAR_BY, 0.0, _NEAR_BY, 0.8])
-    misfit, rows = _misfit(drive, vehicle, motion, begun, float(shifts[-1]))
+    misfit, rows = _misfit(drive, vehicle, motion, begun, known + shifts[shifts != 0.0])
     scores = np.array([misfit(float(known + shift)) for shift in shifts])
     if not np.isfinite(scores).all():
         return 0.0
@@ -239,24 +238,29 @@ def _misfit(
     vehicle: Vehicle,
     motion: Motion,
     begun: ForceBalance,
-    reach: float,
+    delays: Floats,
 ) -> tuple[Callable[[float], float], float]:
     """One less the correlation r of force and specific force, and how many windows are behind it.
 
-    Rows are those of ``begun`` that are usable, and farther than ``reach`` [s] from any that is
-    not: rows that come and go with the delay would make its misfit rough. Of a fit of one by the
-    other ``1 - r^2`` is left, as a part of the variance.
+    Rows are those usable at all ``delays`` and at that of ``begun``. Of a fit of one by the other
+    ``1 - r^2`` is left, as a part of the variance.
     """
-    setup, table = begun.setup, begun.table
+    setup = begun.setup
     assert setup is not None
+    views = {begun.delay: begun.table}
     period = source_signal(drive, vehicle).period
     lagged = in_band(lagged_motion(motion, vehicle.timing.torque_lag), vehicle, period)
-    common = table.usable & np.isfinite(table.traction_force)
-    if not common.all():
-        common &= distance_to_nearest(table.time, table.time[~common]) > reach
+    for delay in map(float, delays):
+        views[delay] = usable_rows(drive, vehicle, motion, lagged, delay, setup)
+    # Rows that come and go with the delay would make its misfit rough.
+    common = np.logical_and.reduce(
+        [table.usable & np.isfinite(table.traction_force) for table in views.values()]
+    )
 
     def misfit(delay: float) -> float:
-        table = force_rows(drive, vehicle, lagged, delay, setup)
+        table = views.get(delay)
+        if table is None:
+            table = force_rows(drive, vehicle, lagged, delay, setup)
         rows = common & np.isfinite(table.traction_force) & np.isfinite(table.specific_force)
         if np.count_nonzero(rows) < FEWEST_ROWS:
             return float("nan")

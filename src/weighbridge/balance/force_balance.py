@@ -176,6 +176,16 @@ def force_rows(
     return _read(drive, vehicle, lagged, source, delay, setup.engine_delay, setup).table
 
 
+def usable_rows(
+    drive: Drive, vehicle: Vehicle, motion: Motion, lagged: Motion, delay: float, setup: ForceSetup
+) -> ForceTable:
+    """Return the rows as of `force_rows` with reasons; parameters likewise."""
+    source = source_signal(drive, vehicle)
+    read = _read(drive, vehicle, lagged, source, delay, setup.engine_delay, setup)
+    lag = vehicle.timing.torque_lag
+    return _judged(drive, vehicle, motion, source, read, lag, True, setup.fill, setup)[1]
+
+
 def _judged(
     drive: Drive,
     vehicle: Vehicle,

@@ -18,6 +18,9 @@ SLOPE: Final = 1e-4
 FIRST: Final = 0.5
 """Length of the first step down its slope."""
 
+LONGEST: Final = 1.0
+"""A longer step is shortened to this: the logarithm of a level is sought, not of another size."""
+
 HALVED: Final = 6
 """A step that gains nothing is halved so many times at most."""
 
@@ -34,7 +37,7 @@ def lowest_by_slopes(
     ----------
     misfit : of (k,) numbers of about the same size
     start : (k,) where to begin
-    close : the search ends where a step gains less
+    close : the search ends where a step gains less, and promises less
     farthest : of each number, to both sides of 0
 
     Returns
@@ -55,6 +58,7 @@ def lowest_by_slopes(
     inverse = unit * FIRST / max(float(np.linalg.norm(down)), 1e-12)
     for k in range(FEW):
         step = -inverse @ down
+        step *= min(1.0, LONGEST / max(float(np.linalg.norm(step)), 1e-12))
         for _ in range(HALVED):
             new = np.clip(x + step, -farthest, farthest)
             value = misfit(new)
@@ -62,11 +66,9 @@ def lowest_by_slopes(
                 break
             step = 0.5 * step
         else:
-            return x
+            break
         gained, moved = here - value, new - x
         x, here = new, value
-        if gained < close:
-            break
         before, down = down, slopes(x, here)
         turned = down - before
         curved = float(moved @ turned)
@@ -75,6 +77,9 @@ def lowest_by_slopes(
                 inverse = unit * curved / float(turned @ turned)
             keep = unit - np.outer(moved, turned) / curved
             inverse = keep @ inverse @ keep.T + np.outer(moved, moved) / curved
+        # A short step that was halved gains little as well, but more is to be gained.
+        if max(gained, 0.5 * float(down @ inverse @ down)) < close:
+            break
     return x
 
 
