@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tempfile
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -157,6 +157,19 @@ def _cut_off_clock(one: Subject, vehicle: Vehicle, *, drive: str, part: float, l
     made = _cut(one, vehicle, drive=drive, part=part, equipment="full")
     bus = [s for s in made.drive.signals.values() if QUANTITIES[s.name].table == "obd"]
     moved = (replace(s, time=s.time + late) for s in bus)
+    return made._replace(drive=made.drive.with_signals(*moved))
+
+
+def _off_clock(
+    one: Subject, vehicle: Vehicle, *, drive: str, names: Sequence[str], late: float, grows: float
+) -> Made:
+    """Make signals late without an inertial sensor, and later until the end [s]."""
+    made = _seen(one, vehicle, drive=drive, equipment="no IMU")
+    moved = [
+        Signal(n, s.time + late + grows * (s.time - s.time[0]) / np.ptp(s.time), s.values)
+        for n in names
+        if (s := made.drive.get(n)) is not None
+    ]
     return made._replace(drive=made.drive.with_signals(*moved))
 
 
@@ -384,6 +397,25 @@ def _off_clocks() -> Iterator[Pair]:
                 "cut of 300 s: bus seconds off", of, "full", make, sound=False,
                 reference=f"{of}/{name} from 30%/full",
             )  # fmt: skip
+
+
+def _gnss_clocks() -> Iterator[Pair]:
+    """Without an inertial sensor, GNSS or its heights on a clock of their own."""
+    ways = (
+        ("GNSS", 5.0, 0.0), ("GNSS", -12.0, 0.0), ("GNSS", 0.0, 6.0),
+        ("heights", 4.0, 0.0), ("heights", -3.0, 0.0),
+    )  # fmt: skip
+    for of in MADE:
+        for name in ("drive",) if of.startswith("own") else ("ordinary", "motorway"):
+            for what, late, grows in ways:
+                how = f"{late:+g} s" if late else f"drifts by {grows:g} s"
+                names = GNSS if what == "GNSS" else ("altitude",)
+                yield Pair(
+                    f"{of}/{name}/{what} {how}, no IMU", f"fault: {what} off the clock, no IMU",
+                    of, "no IMU",
+                    partial(_off_clock, drive=name, names=names, late=late, grows=grows),
+                    sound=False, reference=f"{of}/{name}/no IMU",
+                )  # fmt: skip
 
 
 def _faults() -> Iterator[Pair]:
@@ -635,7 +667,8 @@ def _gearboxes() -> Iterator[Pair]:
 def all_pairs() -> list[Pair]:
     """List all pairs, in an order that stays."""
     return [
-        *_of_equipment(), *_cuts(), *_off_clocks(), *_faults(), *_heights(), *_recordings(),
+        *_of_equipment(), *_cuts(), *_off_clocks(), *_gnss_clocks(), *_faults(), *_heights(),
+        *_recordings(),
         *_strangers(),
         *_misread_pairs(), *_in_feet(), *_other_sensors(), *_other_rates(),
         *_gearboxes(), *_cut_offs(),

@@ -187,6 +187,56 @@ def test_clocks_seconds_apart_are_no_swapped_axes(made):
     )
 
 
+def without_imu(drive):
+    return drive.without(*(n for n in drive.signals if QUANTITIES[n].table == "imu"))
+
+
+def gnss_lateness(drive):
+    """By how much the speed over ground is later than the vehicle speed [s]."""
+    ground, speed = drive.signals["gnss_speed"], drive.signals["vehicle_speed"]
+    lags = np.arange(-3.0, 3.0, 0.02)
+    off = [np.nanmean((speed.at(ground.time - lag) - ground.values) ** 2) for lag in lags]
+    return lags[np.argmin(off)]
+
+
+@pytest.mark.parametrize("late", [-20.0, -3.0, 1.5, 7.0])
+def test_without_an_inertial_sensor_gnss_is_moved_onto_the_bus(made, late):
+    bare = without_imu(made.drive)
+    known = gnss_lateness(bare)
+    mended = correct_drive(retimed(bare, ("gnss",), lambda t: t + late))
+    (note,) = [p for p in mended.problems if p.id == "clock.moved"]
+    told = re.search(r"the clock of gnss is ([-+.0-9]+) s off against that of obd", note.text)
+    assert float(told[1]) == pytest.approx(late, abs=0.3)
+    assert gnss_lateness(mended) == pytest.approx(known, abs=0.2)
+
+
+def test_without_an_inertial_sensor_a_drift_of_gnss_is_taken_out(made):
+    bare = without_imu(made.drive)
+    mended = correct_drive(retimed(bare, ("gnss",), lambda t: 1.004 * t))
+    later = mended.signals["gnss_speed"].time - bare.signals["gnss_speed"].time
+    assert np.ptp(later) < 0.3
+    assert any(p.id == "clock.moved" for p in mended.problems)
+
+
+def test_without_an_inertial_sensor_sound_clocks_are_left_to_the_last_bit(made):
+    bare = without_imu(made.drive)
+    mended = correct_drive(bare)
+    assert mended.problems == bare.problems
+    for name, signal in bare.signals.items():
+        assert_array_equal(mended.signals[name].time, signal.time)
+
+
+def test_gnss_that_hardly_shows_its_clock_is_moved_by_all_of_the_drive(made):
+    # Speed over ground as noisy as that between fixes: no piece shows the lag alone.
+    bare = without_imu(made.drive)
+    ground = bare.signals["gnss_speed"]
+    noise = np.random.default_rng(3).normal(0.0, 1.2, len(ground))
+    noisy = bare.with_signals(replace(ground, values=np.abs(ground.values + noise)))
+    mended = correct_drive(retimed(noisy, ("gnss",), lambda t: t + 5.0))
+    moved = mended.signals["gnss_speed"].time - ground.time
+    assert np.max(np.abs(moved)) < 0.5
+
+
 def inertial_as(drive, change, start=500.0, end=800.0):
     """Put what ``change`` makes of the samples before a time in the place of those in it."""
     return drive.with_signals(

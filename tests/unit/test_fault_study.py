@@ -113,8 +113,8 @@ SAID = {
     "payload": "with a probability of 43 % the load changed at a stop, most likely before 200 s; "
     "mass and interval contain this",
     "delay": "torque delay +0.21 s found from this drive",
-    "drift": "the clock of obd drifts by +496 ppm against that of imu, by speed and acceleration; "
-    "they were aligned (by up to 0.58 s)",
+    "drift": "the clock of obd drifts by +496 ppm against that of imu, by the motion that both "
+    "show; they were aligned (by up to 0.58 s)",
     "stands": "the vehicle stands still for 14 min from 300 s; if it was loaded there, look at the "
     "mass of each segment",
     "air": "engine_load reads 0.91 times as much as mass_air_flow shows by the calibration of car: "

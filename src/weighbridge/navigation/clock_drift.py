@@ -1,4 +1,4 @@
-"""Tables whose clock drifts or jumps against the inertial sensor, brought back onto one clock."""
+"""Tables whose clock is off, drifts or jumps against another's, brought back onto one clock."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from weighbridge.navigation.clock_lag import (
     find_lags,
     find_offset,
     locate_step,
+    whole_lag,
 )
 from weighbridge.navigation.frozen import without_frozen
 from weighbridge.signals import (
@@ -64,6 +65,8 @@ _BLUR: Final = 45.0
 # and no delay of a calibration.
 _USUAL: Final = 0.1
 _OWN: Final = (-0.5, 1.5)
+# The same of GNSS against the vehicle speed, beside which no inertial sensor is [s].
+_OWN_OF_GNSS: Final = (-0.8, 0.8)
 # Of a clock that was right when the recording began [s].
 _BEGUN: Final = (-0.3, 0.8)
 # Two tables that drift alike against the third: it is the third whose clock is wrong [s].
@@ -97,17 +100,18 @@ class _Path:
 
 
 def correct_clocks(drive: Drive) -> Drive:
-    """Bring tables back onto the clock of the inertial sensor where they leave it.
+    """Bring tables back onto the clock of the inertial sensor, or of the bus, where they leave it.
 
     The lag of vehicle speed and of speed over ground against the accelerometer is found in
     pieces of a few minutes. Where it changes over the drive, by drift, by a step or by rows that
     were lost, the table is moved so that it stays what it was at the beginning; rows about a step
-    are left out. Where both drift alike, the inertial sensor is moved. Sound clocks are left as
-    they are, to the last bit.
+    are left out. Where both drift alike, the inertial sensor is moved. Without one, GNSS is moved
+    onto the clock of the vehicle speed. Sound clocks are left as they are, to the last bit.
 
     Parameters
     ----------
-    drive : with an accelerometer of three axes and a speed, else it is returned as it is
+    drive : with a speed, and an accelerometer of three axes or a second speed, else it is returned
+        as it is
 
     Returns
     -------
@@ -129,15 +133,22 @@ def _round(drive: Drive) -> Drive:
     axes = [f"accel_{a}" for a in "xyz"]
     unfrozen = without_frozen(drive, axes)
     accel = [s for name in axes if (s := unfrozen.get(name)) is not None and len(s) > 50]
-    if len(accel) < 3:
-        return drive
-    force = Integrated.of(accel)
+    tables = {"obd": drive.get("vehicle_speed"), "gnss": _gnss_speed(drive)}
+    if len(accel) == len(axes):
+        other, own, force = "imu", _OWN, Integrated.of(accel)
+    else:
+        reference = tables.pop("obd")
+        if reference is None or len(reference) < 50:
+            return drive
+        other, own, force = "obd", _OWN_OF_GNSS, Integrated.of_speed(reference)
     found = {}
-    for table, speed in (("obd", drive.get("vehicle_speed")), ("gnss", _gnss_speed(drive))):
+    for table, speed in tables.items():
         if speed is None or len(speed) < 50:
             continue
         lags = _lags(force, speed)
-        path = _judged(lags, table)
+        path = _judged(lags, table, own)
+        if path is None and table == "gnss" and lags.lag.size < _SHOWN * lags.pieces:
+            path = _even(whole_lag(force, speed, own), speed)
         if isinstance(path, Problem):
             return drive.with_problems(path)
         if path is not None:
@@ -146,7 +157,7 @@ def _round(drive: Drive) -> Drive:
     if len(found) == 2 and _alike(found["obd"], found["gnss"]):
         return _imu_moved(drive, found["obd"])
     for table, path in found.items():
-        drive = _table_moved(drive, table, path)
+        drive = _table_moved(drive, table, other, path)
     return drive
 
 
@@ -183,12 +194,18 @@ def _lags(force: Integrated, speed: Signal) -> Lags:
     return lags
 
 
-def _judged(lags: Lags, table: str) -> _Path | Problem | None:
-    """Say how a table is to be moved, that it cannot be, or None where its clock is sound."""
+def _judged(lags: Lags, table: str, own: tuple[float, float]) -> _Path | Problem | None:
+    """Say how a table is to be moved, that it cannot be, or None where its clock is sound.
+
+    Parameters
+    ----------
+    lags, table
+    own : lags that a sensor may have itself [s]
+    """
     if not lags.lag.size:
         return None
     if lags.lag.size < FEWEST_PIECES:
-        return _constant(lags)
+        return _constant(lags, own)
     time, lag = lags.time, lags.lag
     # By second differences, so that neither drift nor step counts as scatter.
     scatter = max(spread(np.diff(lag, 2)) / np.sqrt(6.0), float(np.median(lags.std)))
@@ -197,7 +214,7 @@ def _judged(lags: Lags, table: str) -> _Path | Problem | None:
     drifts = abs(slope) * length > _DRIFT and abs(slope) > _SURE * slope_std
     allowed = _WANDER + 4.0 * scatter
     wanders = float(np.ptp(median_of_three(lag))) > allowed
-    apart = not _OWN[0] < float(np.median(lag)) < _OWN[1]
+    apart = not own[0] < float(np.median(lag)) < own[1]
     if not (drifts or wanders or apart):
         return None
     if lags.lag.size < _SHOWN * lags.pieces:
@@ -214,13 +231,18 @@ def _judged(lags: Lags, table: str) -> _Path | Problem | None:
     return _broken(time, lag, table)
 
 
-def _constant(lags: Lags) -> _Path | None:
+def _constant(lags: Lags, own: tuple[float, float]) -> _Path | None:
     """Lag of a short drive, where its pieces show one alike and no sensor is so late itself."""
     middle = float(np.average(lags.lag, weights=1.0 / lags.std**2))
     apart = np.ptp(lags.lag) > _WANDER or lags.lag.size < _SHOWN * lags.pieces
-    if apart or _OWN[0] < middle < _OWN[1]:
+    if apart or own[0] < middle < own[1]:
         return None
     return _Path(lags.time, np.full(lags.time.size, middle), 0.0, (), "")
+
+
+def _even(lag: float | None, speed: Signal) -> _Path | None:
+    """One lag of a whole drive, if any."""
+    return None if lag is None else _Path(speed.time[[0, -1]], np.full(2, lag), 0.0, (), "")
 
 
 def _broken(time: Floats, lag: Floats, table: str) -> _Path | Problem | None:
@@ -287,12 +309,12 @@ def _level(path: _Path) -> float:
     return first if _BEGUN[0] < first < _BEGUN[1] else _USUAL
 
 
-def _table_moved(drive: Drive, table: str, path: _Path) -> Drive:
-    """Move the signals of a table onto the inertial clock; leave out rows about a step."""
+def _table_moved(drive: Drive, table: str, other: str, path: _Path) -> Drive:
+    """Move the signals of a table onto the clock of another; leave out rows about a step."""
     level = _level(path)
     return _moved(
         drive, table, lambda t: t - path.at(t) + level, path.cuts, -path.slope
-    ).with_problems(_note(table, "imu", path, level))  # fmt: skip
+    ).with_problems(_note(table, other, path, level))  # fmt: skip
 
 
 def _imu_moved(drive: Drive, path: _Path) -> Drive:

@@ -1,4 +1,4 @@
-"""How late one table of a drive is against its inertial sensor, piece by piece."""
+"""How late one table of a drive is against another, by what both show of the motion."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 
 from weighbridge.kernels.interpolation import integral
+from weighbridge.limits import CERTAIN
 from weighbridge.signals import Bools, Floats, Signal, moving_mean, resolution
 from weighbridge.signals.interpolation import interpolate
 from weighbridge.signals.lag import lag_std, parabola
@@ -58,12 +59,12 @@ _PEAK: Final = 3.0
 
 @dataclass(frozen=True, slots=True)
 class Lags:
-    """Lag of a table against the inertial sensor, by pieces of the drive.
+    """Lag of a table against another, by pieces of the drive.
 
     Attributes
     ----------
     time : (k,) middles of the pieces, by the table's own clock [s]
-    lag : (k,) stamp minus the instant of the same motion by the inertial clock [s]
+    lag : (k,) stamp minus the instant of the same motion by the other clock [s]
     std : (k,) standard deviation of the lag [s]
     missed : (j,) middles of pieces lively enough to show a lag that showed none [s]
     """
@@ -81,14 +82,17 @@ class Lags:
 
 @dataclass(frozen=True, slots=True)
 class Integrated:
-    """Specific force of the three sensor axes, integrated over time.
+    """What a clock is compared with: integrals whose changes are those of the speed.
+
+    They are of the specific force along each sensor axis, or a speed itself.
 
     Attributes
     ----------
-    times : (n,) stamps of each axis [s], thinned to what the grid needs
-    integrals : (n,) of each axis at them, less its median [m/s]
+    times : (n,) stamps of each [s], thinned to what the grid needs
+    integrals : (n,) at them, of an axis less its median [m/s]
     start, end : first and last stamp of all [s]
-    samples : of the axis that has fewest
+    samples : of that which has fewest
+    gap : time between stamps over which nothing is known [s]
     """
 
     times: tuple[Floats, ...]
@@ -96,6 +100,7 @@ class Integrated:
     start: float
     end: float
     samples: int
+    gap: float
 
     @classmethod
     def of(cls, accel: Sequence[Signal]) -> Integrated:
@@ -109,18 +114,31 @@ class Integrated:
             start=min(float(s.time[0]) for s in accel),
             end=max(float(s.time[-1]) for s in accel),
             samples=min(len(s) for s in accel),
+            gap=_FORCE_GAP,
+        )
+
+    @classmethod
+    def of_speed(cls, speed: Signal) -> Integrated:
+        """Take a speed, whose changes another speed has as well."""
+        return cls(
+            times=(speed.time,),
+            integrals=(speed.values,),
+            start=float(speed.time[0]),
+            end=float(speed.time[-1]),
+            samples=len(speed),
+            gap=max(_SPEED_GAP, 3.0 * speed.period),
         )
 
 
 def find_lags(force: Integrated, speed: Signal, *, centre: float = 0.0) -> Lags:
-    """Find the lag of a speed against an accelerometer of any mounting, piece by piece.
+    """Find the lag of a speed against an accelerometer of any mounting or a speed, by pieces.
 
-    In each piece the changes of speed are regressed on those of the integrated specific force
-    of the three axes, moved by every lag in turn; the best is refined by a parabola.
+    In each piece the changes of speed are regressed on those of the integrals, moved by every lag
+    in turn; the best is refined by a parabola.
 
     Parameters
     ----------
-    force : of the accelerometer
+    force : of the accelerometer, or another speed
     speed : by the clock that is examined
     centre : lag around which is looked [s]
     """
@@ -170,6 +188,44 @@ def find_lags(force: Integrated, speed: Signal, *, centre: float = 0.0) -> Lags:
     )
 
 
+def whole_lag(force: Integrated, speed: Signal, own: tuple[float, float]) -> float | None:
+    """Find one lag of a whole drive, of which no piece may show it clearly [s].
+
+    Parameters
+    ----------
+    force, speed : as of `find_lags`
+    own : lags that a sensor may have itself [s]
+
+    Returns
+    -------
+    None where the best of ``own`` explains the changes of the speed as well, within `CERTAIN`
+    standard deviations
+
+    References
+    ----------
+    Likelihood ratio: Wilks, Annals of Mathematical Statistics 9, 1938.
+    """
+    start, most = float(speed.time[0]), round(REACH[-1] / STEP)
+    count = int((float(speed.time[-1]) - start) / STEP)
+    if count < round(_SHORTEST / STEP) or force.samples < 50:
+        return None
+    grid: Floats = np.asarray(start + STEP * np.arange(-most, count + most), dtype=np.float64)
+    shown, seen = _speed_changes(speed, grid[most : most + count])
+    changes, felt = _force_changes(force, grid)
+    axes = np.column_stack([*_high_passed(np.array(changes), felt)])
+    explained, enough = _explained(_high_passed(shown, seen), axes, felt)
+    # Force later in the row is force at a smaller lag.
+    lags: Floats = np.asarray(STEP * np.arange(most, -most - 1, -1), dtype=np.float64)
+    seconds = STEP * np.count_nonzero(seen)
+    likelihood = -0.5 * seconds / _SPAN * np.log1p(-np.minimum(explained, 1.0 - 1e-9))
+    best = int(np.argmax(np.where(enough, likelihood, -np.inf)))
+    usual = likelihood[(lags >= own[0]) & (lags <= own[1])].max()
+    if best in (0, lags.size - 1) or likelihood[best] - usual < 0.5 * CERTAIN**2:
+        return None
+    near = slice(best - 1, best + 2)
+    return parabola(lags[near][::-1], -likelihood[near][::-1]).at
+
+
 def find_offset(force: Integrated, speed: Signal) -> float | None:
     """Find one lag for a whole drive among all that leave the records together [s].
 
@@ -188,7 +244,7 @@ def find_offset(force: Integrated, speed: Signal) -> float | None:
     changes, felt = _force_changes(force, np.arange(first, last, STEP))
     axes = np.column_stack([*_high_passed(np.array(changes), felt)])
     gram = axes.T @ axes
-    gram += 1e-6 * np.trace(gram) * np.eye(3) + 1e-12 * np.eye(3)
+    gram += _ridge(gram)
     size = next_fast_len(x.size + axes.shape[0], real=True)
     spectrum = np.conj(rfft(x, size))
     cross = np.column_stack([irfft(rfft(f, size) * spectrum, size) for f in axes.T])
@@ -255,7 +311,7 @@ def _force_changes(force: Integrated, grid: Floats) -> tuple[list[Floats], Bools
     changes = [_change(*axis, grid) for axis in zip(force.times, force.integrals, strict=True)]
     for time in {id(time): time for time in force.times}.values():
         step = np.diff(time)
-        holes = np.concatenate(([0.0], np.cumsum(np.where(step > _FORCE_GAP, step, 0.0))))
+        holes = np.concatenate(([0.0], np.cumsum(np.where(step > force.gap, step, 0.0))))
         felt &= (grid - _SPAN > time[0]) & (grid + _SPAN < time[-1])
         felt &= _change(time, holes, grid) == 0.0
     return [np.where(felt, c, 0.0) for c in changes], felt
@@ -314,6 +370,12 @@ def _peak(explained: Floats, enough: Bools, size: int) -> tuple[float, float] | 
     return at, lag_std(max(float(around[1]), 1e-3), bend, size * STEP / _SPAN)
 
 
+def _ridge(gram: Floats) -> Floats:
+    """Keep sums of products (k, k) solvable where an axis feels nothing."""
+    size = len(gram)
+    return np.asarray((1e-6 * np.trace(gram) / size + 1e-12) * np.eye(size))
+
+
 def _explained(x: Floats, force: Floats, felt: Bools) -> tuple[Floats, Bools]:
     """Part of the variance that the axes explain at each shift, and where it is known.
 
@@ -325,9 +387,8 @@ def _explained(x: Floats, force: Floats, felt: Bools) -> tuple[Floats, Bools]:
     """
     cross = np.column_stack([np.correlate(axis, x, "valid") for axis in force.T])
     products = force[:, :, None] * force[:, None, :]
-    total = np.concatenate((np.zeros((1, 3, 3)), np.cumsum(products, axis=0)))
-    gram = total[x.size :] - total[: -x.size]
-    gram += 1e-6 * np.trace(total[-1]) * np.eye(3) / 3.0 + 1e-12 * np.eye(3)
+    total = np.concatenate((np.zeros_like(products[:1]), np.cumsum(products, axis=0)))
+    gram = total[x.size :] - total[: -x.size] + _ridge(total[-1])
     fit = np.linalg.solve(gram, cross[:, :, None])[:, :, 0]
     seen = np.concatenate(([0], np.cumsum(felt)))
     enough = (seen[x.size :] - seen[: -x.size]) >= _SEEN * x.size
@@ -355,7 +416,7 @@ def _explained_in_gaps(
         x, *axes = _high_passed(np.where(both, moved, 0.0), both)
         rows = np.column_stack(axes)
         gram = rows.T @ rows
-        gram += 1e-6 * np.trace(gram) * np.eye(3) / 3.0 + 1e-12 * np.eye(3)
+        gram += _ridge(gram)
         cross = rows.T @ x
         explained[k] = float(cross @ np.linalg.solve(gram, cross)) / max(float(x @ x), 1e-12)
     return explained, enough

@@ -8,10 +8,11 @@ import numpy as np
 
 from weighbridge.constants import GRAVITY
 from weighbridge.messages import Problem, refused
+from weighbridge.navigation.height_lag import find_height_lag
 from weighbridge.navigation.longitudinal import LONGEST_GAP, resample
 from weighbridge.navigation.motion import Motion, MotionSource
 from weighbridge.navigation.smoothing import GRADE_STD, smooth_grade, smooth_height, smooth_speed
-from weighbridge.signals import Drive, Floats
+from weighbridge.signals import Drive, Floats, Signal
 
 SHORTEST: Final = 20.0
 """A shorter drive is not worth a look [s]."""
@@ -24,7 +25,8 @@ def speed_motion(drive: Drive, *, rate: float = 10.0) -> Motion:
     """Find the motion from speed: acceleration as its smoothed rate of change.
 
     Grade comes from a grade signal, else from height over distance, else the
-    road is taken as level and the notes say so. Acceleration and grade are
+    road is taken as level and the notes say so. It is moved where the torque surely shows the
+    hills at another time. Acceleration and grade are
     conditional means, see `weighbridge.navigation.smoothing`.
 
     Parameters
@@ -49,6 +51,13 @@ def speed_motion(drive: Drive, *, rate: float = 10.0) -> Motion:
     v, accel, speed_std, accel_std = smooth_speed(speed, time)
     distance = np.cumsum(np.where(valid, v, 0.0)) / rate
     grade, grade_std, height, source, notes = _grade(drive, time, distance)
+    hills = "grade" if drive.has("grade") else "altitude"
+    late = find_height_lag(drive, time, v, accel, grade, valid) if drive.has(hills) else None
+    if late is not None and late.shown:
+        shown = drive.signals[hills]
+        moved = drive.with_signals(Signal(hills, shown.time - late.lag, shown.values))
+        grade, grade_std, height, source, notes = _grade(moved, time, distance)
+        notes += (Problem.of("altitude.late", hills, by=late.lag),)
     nowhere = np.full(time.size, np.nan)
     return Motion(
         source=source,
