@@ -9,6 +9,7 @@ import pytest
 HOME = Path(__file__).parents[2]
 PAGES = {
     "car_equipment": "studies/car_equipment.md",
+    "clocks": "studies/clocks.md",
     "live": "docs/live_figures.md",
     "fleet_scale": "studies/fleet_scale.md",
     "gearboxes": "studies/gearboxes.md",

@@ -43,7 +43,7 @@ def of_height(motion):
 
 
 @pytest.mark.parametrize("rate", [4.0, 1.0])
-@pytest.mark.parametrize("late", [-5.0, 2.5, 6.0])
+@pytest.mark.parametrize("late", [-5.0, 2.5, 6.0, 17.0])
 def test_late_heights_are_moved_to_their_hills(late, rate):
     motion = find_motion(driven(late, rate=rate))
     (note,) = of_height(motion)

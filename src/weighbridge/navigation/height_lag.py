@@ -12,8 +12,8 @@ from weighbridge.signals import Bools, Drive, Floats, parabola, robust_fits
 READINGS: Final = ("engine_torque", "engine_torque_fraction", "engine_load")
 """What goes with the torque; the first that was recorded is taken."""
 
-LAGS: Final[Floats] = np.arange(-8.0, 8.5, 1.0)
-"""Lags of the heights that are tried [s]."""
+LAGS: Final[tuple[Floats, ...]] = (np.arange(-8.0, 8.5, 1.0), np.arange(-30.0, 30.5, 1.0))
+"""Lags of the heights that are tried, and those where an end of them is best [s]."""
 
 OF_READING: Final = 0.3
 """How late the torque usually is [s]: one that is later makes the lag smaller by the rest."""
@@ -27,8 +27,10 @@ BLOCK: Final = 60.0
 LEAST: Final = 1.5
 """Smaller lags are left [s]: they are worth 2 % of the mass at most, in hills."""
 
-GAIN: Final = 0.06
-"""Part of what is left unexplained that the lag explains at least [-]."""
+GAIN: Final = 0.1
+"""Part of what is left unexplained that the lag explains at least [-]: 0.097 at most in 224
+undamaged drives of 24 vehicles, two hybrids' engines; 0.08 to 0.43 with heights 3 s late in hills
+that matter."""
 
 
 class HeightLag(NamedTuple):
@@ -91,28 +93,33 @@ def find_height_lag(
         return np.asarray(np.bincount(window, x[known])[whole] / count[whole])
 
     rest = np.column_stack([means(accel), means(speed**2), np.ones(np.count_nonzero(whole))])
-    hills = [means(np.interp(time + lag, time, grade)) for lag in LAGS]
-    columns = np.array([np.column_stack([rest, hill]) for hill in hills])
-    y = np.tile(means(reading.at(time + OF_READING) * gearing), (LAGS.size, 1))
-    fit, weight = robust_fits(columns, y)
-    left = weight * (y - np.einsum("bnk,bk->bn", columns, fit)) ** 2
+    force = means(reading.at(time + OF_READING) * gearing)
     begins = WINDOW * np.flatnonzero(whole)
     block = np.unique((begins / BLOCK).astype(np.int64), return_inverse=True)[1]
     blocks = int(block.max()) + 1
     if blocks < FEWEST_BLOCKS:
         return None
-    by_block = np.array([np.bincount(block, row, minlength=blocks) for row in left])
-    total = by_block.sum(axis=1)
-    lag = _lowest(total)
-    others = np.array([_lowest(total - by_block[:, k]) for k in range(blocks)])
+    for lags in LAGS:
+        columns = np.array(
+            [np.column_stack([rest, means(np.interp(time + lag, time, grade))]) for lag in lags]
+        )
+        y = np.tile(force, (lags.size, 1))
+        fit, weight = robust_fits(columns, y)
+        left = weight * (y - np.einsum("bnk,bk->bn", columns, fit)) ** 2
+        by_block = np.array([np.bincount(block, row, minlength=blocks) for row in left])
+        total = by_block.sum(axis=1)
+        usual = float(total[np.abs(lags) <= LEAST].min())
+        gain = 1.0 - float(total.min()) / max(usual, 1e-300)
+        if gain <= GAIN or int(np.argmin(total)) not in (0, lags.size - 1):
+            break
+    others = np.array([_lowest(lags, total - by_block[:, k]) for k in range(blocks)])
     std = float(np.sqrt((blocks - 1) / blocks * np.sum((others - others.mean()) ** 2)))
-    usual = float(total[np.abs(LAGS) <= LEAST].min())
-    return HeightLag(lag, std, 1.0 - float(total.min()) / usual)
+    return HeightLag(_lowest(lags, total), std, gain)
 
 
-def _lowest(left: Floats) -> float:
+def _lowest(lags: Floats, left: Floats) -> float:
     best = int(np.argmin(left))
-    if best in (0, LAGS.size - 1):
-        return float(LAGS[best])
+    if best in (0, lags.size - 1):
+        return float(lags[best])
     near = slice(best - 1, best + 2)
-    return parabola(LAGS[near], left[near]).at
+    return parabola(lags[near], left[near]).at
