@@ -26,6 +26,22 @@ def at_first_use(package: str, homes: Mapping[str, str]) -> Callable[[str], Any]
     return found
 
 
+def at_first_uses(
+    package: str, homes: Mapping[str, str]
+) -> tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]:
+    """Return ``__getattr__``, ``__dir__`` and ``__all__`` of a package of public names.
+
+    Parameters
+    ----------
+    package : its name
+    homes : public names of each of its modules, parted by blanks
+    """
+    found = {
+        name: f"{package}.{module}" for module, names in homes.items() for name in names.split()
+    }
+    return at_first_use(package, found), lambda: sorted(found), sorted(found)
+
+
 def at_first_call(path: str) -> Callable[..., Any]:
     """Return a function, or a class to call, whose module is imported when it is first called.
 

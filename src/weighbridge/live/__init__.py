@@ -4,90 +4,57 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from weighbridge.first_use import at_first_use
+from weighbridge.first_use import at_first_uses
 
 if TYPE_CHECKING:
-    from weighbridge.live.alerts import Alert
-    from weighbridge.live.arrival import Arrivals, Need, needs
-    from weighbridge.live.emulator import Played, devices
-    from weighbridge.live.feed import Feed
-    from weighbridge.live.keeper import Keeper
-    from weighbridge.live.orders import OrderFile, order_file
-    from weighbridge.live.outputs import Output, Outputs
-    from weighbridge.live.outputs.lines import Lines
-    from weighbridge.live.outputs.mqtt import Mqtt, parse_broker
-    from weighbridge.live.outputs.page import Page
-    from weighbridge.live.recorder import Recorder
-    from weighbridge.live.recordings import Recordings
-    from weighbridge.live.replay import Replay
-    from weighbridge.live.scale import LiveScale
-    from weighbridge.live.session import Session, order
-    from weighbridge.live.source import Source
-    from weighbridge.live.sources import SOURCES, parse_source
-    from weighbridge.live.weighing import LiveStatus, LiveWeighing
+    from weighbridge.live.alerts import Alert as Alert
+    from weighbridge.live.arrival import Arrivals as Arrivals
+    from weighbridge.live.arrival import Need as Need
+    from weighbridge.live.arrival import needs as needs
+    from weighbridge.live.emulator import Played as Played
+    from weighbridge.live.emulator import devices as devices
+    from weighbridge.live.feed import Feed as Feed
+    from weighbridge.live.keeper import Keeper as Keeper
+    from weighbridge.live.orders import OrderFile as OrderFile
+    from weighbridge.live.orders import order_file as order_file
+    from weighbridge.live.outputs import Output as Output
+    from weighbridge.live.outputs import Outputs as Outputs
+    from weighbridge.live.outputs.lines import Lines as Lines
+    from weighbridge.live.outputs.mqtt import Mqtt as Mqtt
+    from weighbridge.live.outputs.mqtt import parse_broker as parse_broker
+    from weighbridge.live.outputs.page import Page as Page
+    from weighbridge.live.recorder import Recorder as Recorder
+    from weighbridge.live.recordings import Recordings as Recordings
+    from weighbridge.live.replay import Replay as Replay
+    from weighbridge.live.scale import LiveScale as LiveScale
+    from weighbridge.live.session import Session as Session
+    from weighbridge.live.session import order as order
+    from weighbridge.live.source import Source as Source
+    from weighbridge.live.sources import SOURCES as SOURCES
+    from weighbridge.live.sources import parse_source as parse_source
+    from weighbridge.live.weighing import LiveStatus as LiveStatus
+    from weighbridge.live.weighing import LiveWeighing as LiveWeighing
 
-_HOMES = {
-    "SOURCES": "weighbridge.live.sources",
-    "Alert": "weighbridge.live.alerts",
-    "Arrivals": "weighbridge.live.arrival",
-    "Feed": "weighbridge.live.feed",
-    "Keeper": "weighbridge.live.keeper",
-    "Lines": "weighbridge.live.outputs.lines",
-    "LiveScale": "weighbridge.live.scale",
-    "LiveStatus": "weighbridge.live.weighing",
-    "LiveWeighing": "weighbridge.live.weighing",
-    "Mqtt": "weighbridge.live.outputs.mqtt",
-    "Need": "weighbridge.live.arrival",
-    "OrderFile": "weighbridge.live.orders",
-    "Output": "weighbridge.live.outputs",
-    "Outputs": "weighbridge.live.outputs",
-    "Page": "weighbridge.live.outputs.page",
-    "Played": "weighbridge.live.emulator",
-    "Recorder": "weighbridge.live.recorder",
-    "Recordings": "weighbridge.live.recordings",
-    "Replay": "weighbridge.live.replay",
-    "Session": "weighbridge.live.session",
-    "Source": "weighbridge.live.source",
-    "devices": "weighbridge.live.emulator",
-    "needs": "weighbridge.live.arrival",
-    "order": "weighbridge.live.session",
-    "order_file": "weighbridge.live.orders",
-    "parse_broker": "weighbridge.live.outputs.mqtt",
-    "parse_source": "weighbridge.live.sources",
-}
-
-__all__ = [
-    "SOURCES",
-    "Alert",
-    "Arrivals",
-    "Feed",
-    "Keeper",
-    "Lines",
-    "LiveScale",
-    "LiveStatus",
-    "LiveWeighing",
-    "Mqtt",
-    "Need",
-    "OrderFile",
-    "Output",
-    "Outputs",
-    "Page",
-    "Played",
-    "Recorder",
-    "Recordings",
-    "Replay",
-    "Session",
-    "Source",
-    "devices",
-    "needs",
-    "order",
-    "order_file",
-    "parse_broker",
-    "parse_source",
-]
-
-__getattr__ = at_first_use(__name__, _HOMES)
-
-
-def __dir__() -> list[str]:
-    return sorted(__all__)
+__getattr__, __dir__, __all__ = at_first_uses(
+    __name__,
+    {
+        "alerts": "Alert",
+        "arrival": "Arrivals Need needs",
+        "emulator": "Played devices",
+        "feed": "Feed",
+        "keeper": "Keeper",
+        "orders": "OrderFile order_file",
+        "outputs": "Output Outputs",
+        "outputs.lines": "Lines",
+        "outputs.mqtt": "Mqtt parse_broker",
+        "outputs.page": "Page",
+        "recorder": "Recorder",
+        "recordings": "Recordings",
+        "replay": "Replay",
+        "scale": "LiveScale",
+        "session": "Session order",
+        "source": "Source",
+        "sources": "SOURCES parse_source",
+        "weighing": "LiveStatus LiveWeighing",
+    },
+)
