@@ -124,7 +124,6 @@ def test_the_vehicle_waits_for_the_first_question(drive):
 
 def said(say, command):
     reply = read_reply(say(command).partition(">")[0], command)
-    assert reply.garbage == 0
     return [payload for payloads in reply.answers.values() for payload in payloads]
 
 

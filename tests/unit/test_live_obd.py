@@ -144,7 +144,7 @@ def test_long_answer_gets_no_flow_control(request):
 def test_silent_vehicle_is_asked_seldom_and_comes_back(request, monkeypatch):
     monkeypatch.setattr(schedule_module, "NO_ANSWER", 0.3)
     source = source_on(request.node.name)
-    source._probe = 0.6
+    monkeypatch.setattr("weighbridge.live.sources.polling.PROBE", 0.6)
     with SimulatedEcu(request.node.name, CAR) as ecu, Feed([source]) as feed:
 
         def wait(condition):
@@ -174,7 +174,7 @@ def test_standing_vehicle_is_asked_one_request_at_a_time(request, monkeypatch):
     monkeypatch.setattr(schedule_module, "STANDING", 0.3)
     still = CAR | {0x0C: b"\x00\x00", 0x0D: b"\x00"}
     source = source_on(request.node.name)
-    source._probe = 0.4
+    monkeypatch.setattr("weighbridge.live.sources.polling.PROBE", 0.4)
     with SimulatedEcu(request.node.name, still) as ecu:
         counts = []
 

@@ -114,9 +114,8 @@ class Session:
             self.scale.finish()
             settled = self.scale.weighing(silence)
         for alert in self.alerts:
-            event = alert.look(settled)
-            if event is not None:
-                _LOG.warning("%s", event.text)
+            if event := alert.look(settled):
+                _LOG.warning("%s", event)
         active = [Problem.of("live.alert", alert=a.text) for a in self.alerts if a.active]
         states = tuple(alert.state(settled) for alert in self.alerts)
         lost = [

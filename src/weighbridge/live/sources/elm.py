@@ -16,7 +16,7 @@ from weighbridge.live.sources.kind import SourceOptions, parted_rate
 from weighbridge.live.sources.links import BleLink, Link, SerialLink, tcp
 from weighbridge.live.sources.lock import DeviceLock
 from weighbridge.live.sources.polling import Pace, Poller
-from weighbridge.live.sources.schedule import PROBE, Request
+from weighbridge.live.sources.schedule import Request
 
 BAUDS: Final = (38400, 115200, 9600)
 """Rates of the serial line that adapters leave the works with, the commonest first [bit/s]."""
@@ -67,16 +67,12 @@ class ElmSource:
     ----------
     name : as on the command line
     links : ways to the adapter, tried in turn until it answers
-    probe : a vehicle at rest is asked one request in so long at most [s]
     """
 
-    def __init__(
-        self, name: str, links: tuple[Callable[[], Link], ...], probe: float = PROBE
-    ) -> None:
+    def __init__(self, name: str, links: tuple[Callable[[], Link], ...]) -> None:
         self.name = name
         self.trouble = ""
         self._links = links
-        self._probe = probe
 
     def run(self, put: Callable[[Samples], None], stop: Event) -> None:
         """Ask until asked to stop; see `weighbridge.live.source.Source.run`."""
@@ -87,7 +83,7 @@ class ElmSource:
                 if carrier is None:
                     return
                 try:
-                    Poller(carrier, put, stop, self._say, self._probe).run()
+                    Poller(carrier, put, stop, self._say).run()
                 finally:
                     carrier.close()
             except _Stopped:

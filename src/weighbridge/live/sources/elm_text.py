@@ -43,13 +43,11 @@ class Reply:
     answers : payloads by control unit: its identifier or address, 0 where headers are off
     trouble : the adapter's word for why there is none; empty where there is
     restarted : whether the adapter has begun anew
-    garbage : lines that are nothing
     """
 
     answers: dict[int, list[bytes]] = field(default_factory=dict)
     trouble: str = ""
     restarted: bool = False
-    garbage: int = 0
 
 
 def read_reply(text: str, command: str) -> Reply:
@@ -76,11 +74,10 @@ def read_reply(text: str, command: str) -> Reply:
         elif not _HEX.match(digits):
             trouble = next((word for word in TROUBLES if word in line), "")
             reply.trouble = reply.trouble or trouble
-            reply.garbage += not trouble and line != "OK"
         elif len(digits) == 3:
             size = int(digits, 16)
-        elif not _take(digits, frames, reply.answers):
-            reply.garbage += 1
+        else:
+            _take(digits, frames, reply.answers)
     _add_parts(parts, size, reply)
     _add_frames(frames, reply)
     if reply.answers:
@@ -90,14 +87,13 @@ def read_reply(text: str, command: str) -> Reply:
 
 def _take(
     digits: str, frames: list[tuple[int, bool, bytes]], answers: dict[int, list[bytes]]
-) -> bool:
-    """Take one line of hexadecimal digits for what it looks like; False where it is nothing."""
+) -> None:
+    """Take one line of hexadecimal digits for what it looks like, if it is anything."""
     if len(digits) % 2 == 1:
         # Only an identifier of 11 bits has three digits.
-        if not re.match(r"7E[89A-F]", digits):
-            return False
-        frames.append((int(digits[:3], 16), False, bytes.fromhex(digits[3:])))
-        return True
+        if re.match(r"7E[89A-F]", digits):
+            frames.append((int(digits[:3], 16), False, bytes.fromhex(digits[3:])))
+        return
     data = bytes.fromhex(digits)
     if digits.startswith("18DAF1") and len(data) > 4:
         frames.append((int(digits[:8], 16), True, data[4:]))
@@ -105,9 +101,6 @@ def _take(
         answers.setdefault(0, []).append(data)
     elif len(data) > 5 and data[3] == int(_CURRENT_DATA, 16) and _sound(data):
         answers.setdefault(data[2], []).append(data[3:-1])
-    else:
-        return False
-    return True
 
 
 def _sound(data: bytes) -> bool:
@@ -127,8 +120,6 @@ def _add_parts(parts: dict[int, str], size: int, reply: Reply) -> None:
     data = bytes.fromhex("".join(p if len(p) % 2 == 0 else "" for p in parts.values()))
     if size and len(data) >= size:
         reply.answers.setdefault(0, []).append(data[:size])
-    elif parts:
-        reply.garbage += 1
 
 
 def _add_frames(frames: Sequence[tuple[int, bool, bytes]], reply: Reply) -> None:
@@ -154,8 +145,6 @@ def _add_frames(frames: Sequence[tuple[int, bool, bytes]], reply: Reply) -> None
         ]
         if whole:
             reply.answers.setdefault(sender, []).extend(whole)
-        else:
-            reply.garbage += 1
 
 
 def read_voltage(text: str) -> float | None:

@@ -18,7 +18,7 @@ from weighbridge.live.sources.canbus import BusPlace, receive
 from weighbridge.live.sources.kind import SourceOptions
 from weighbridge.live.sources.lock import DeviceLock
 from weighbridge.live.sources.polling import Pace, Poller
-from weighbridge.live.sources.schedule import PROBE, Request
+from weighbridge.live.sources.schedule import Request
 
 SERVICE: Final = 0x01
 
@@ -50,14 +50,12 @@ class ObdSource:
     Parameters
     ----------
     bus : where it is
-    probe : a vehicle at rest is asked one request in so long at most [s]
     """
 
-    def __init__(self, bus: BusPlace, probe: float = PROBE) -> None:
+    def __init__(self, bus: BusPlace) -> None:
         self.name = bus.source
         self.trouble = ""
         self._bus = bus
-        self._probe = probe
 
     def run(self, put: Callable[[Samples], None], stop: Event) -> None:
         """Ask until asked to stop; see `weighbridge.live.source.Source.run`."""
@@ -66,7 +64,7 @@ class ObdSource:
             bus = self._bus.open(_ANSWERS)
             try:
                 carrier = CanCarrier(bus, self._bus, stop)
-                Poller(carrier, put, stop, self._say, self._probe).run()
+                Poller(carrier, put, stop, self._say).run()
             finally:
                 self.trouble = ""
                 bus.shutdown()

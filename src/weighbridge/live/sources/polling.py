@@ -62,15 +62,9 @@ class Carrier(Protocol):
 
 
 class Pace:
-    """Keeps requests apart.
+    """Keeps requests apart."""
 
-    Parameters
-    ----------
-    rate : requests in a second at most [1/s]
-    """
-
-    def __init__(self, rate: float = REQUEST_RATE) -> None:
-        self._apart = 1.0 / rate
+    def __init__(self) -> None:
         self._next = 0.0
 
     def wait(self, stop: Event) -> None:
@@ -78,7 +72,7 @@ class Pace:
         left = self._next - monotonic()
         if left > 0.0:
             stop.wait(left)
-        self._next = monotonic() + self._apart
+        self._next = monotonic() + 1.0 / REQUEST_RATE
 
 
 class Poller:
@@ -90,7 +84,6 @@ class Poller:
     put : takes the samples
     stop : ends it
     say : takes why no samples come, one sentence; empty where they do
-    probe : a vehicle at rest is asked one request in so long [s]
     """
 
     def __init__(
@@ -99,27 +92,25 @@ class Poller:
         put: Callable[[Samples], None],
         stop: Event,
         say: Callable[[str], None],
-        probe: float = PROBE,
     ) -> None:
         self._carrier = carrier
         self._gathered = Gathered(put)
         self._stop = stop
         self._say = say
-        self._probe = probe
 
     def run(self) -> None:
         """Ask until asked to stop."""
         while not self._stop.is_set():
             volts = self._carrier.voltage()
             if volts is not None and volts < LOW_VOLTAGE:
-                self._say(f"{LOW_BATTERY}; it is looked at again every {self._probe:g} s")
+                self._say(f"{LOW_BATTERY}; it is looked at again every {PROBE:g} s")
                 self._rest()
                 continue
             supported = self._supported()
             if not supported:
                 self._say(
                     "the vehicle does not answer; is the ignition on? It is asked again every "
-                    f"{self._probe:g} s"
+                    f"{PROBE:g} s"
                 )
                 self._rest()
                 continue
@@ -157,7 +148,7 @@ class Poller:
                 self._measure(vigil)
             if why := vigil.why_asleep(time):
                 self._gathered.flush()
-                self._say(f"{why}; it is asked again every {self._probe:g} s")
+                self._say(f"{why}; it is asked again every {PROBE:g} s")
                 silent = vigil.silent
                 self._rest()
                 if silent or self._stop.is_set():
@@ -198,7 +189,7 @@ class Poller:
 
     def _rest(self) -> None:
         """Send nothing for a while; less where the battery is charged, so that the engine runs."""
-        until = monotonic() + self._probe
+        until = monotonic() + PROBE
         measured = monotonic()
         before = self._carrier.voltage()
         while monotonic() < until and not self._stop.wait(_GLANCE):
