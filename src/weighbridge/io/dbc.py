@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from weighbridge.errors import ConfigError
-from weighbridge.io.frames import Frames, bits
+from weighbridge.io.frames import Frames, bits, parameter_group
 from weighbridge.io.labels import is_no_value
 from weighbridge.io.libraries import importing
 from weighbridge.signals import Bools, Floats, Problem
@@ -239,22 +239,15 @@ def message_frames(frames: Frames, database: Database) -> dict[str, NDArray[np.i
         identifier = int(message.frame_id)
         if message.is_extended_frame and message.protocol == "j1939":
             if group is None:
-                group = np.where(
-                    frames.extended & (key >= 0), _group(frames.id.astype(np.int64)), -1
-                )
-            at = np.flatnonzero(group == int(_group(np.array([identifier]))[0]))
+                known = parameter_group(frames.id).astype(np.int64)
+                group = np.where(frames.extended & (key >= 0), known, -1)
+            at = np.flatnonzero(group == parameter_group(np.uint32(identifier)))
         else:
             wanted = identifier << 1 | bool(message.is_extended_frame)
             at = np.flatnonzero(key == wanted) if wanted in present else np.zeros(0, np.intp)
         if at.size:
             found[message.name] = at
     return found
-
-
-def _group(identifier: NDArray[np.int64]) -> NDArray[np.int64]:
-    """J1939 parameter group; below PDU format 240 the low byte is a destination."""
-    group = (identifier >> 8) & 0x3FFFF
-    return np.asarray(np.where(group >> 8 & 0xFF < 240, group & 0x3FF00, group))
 
 
 def find_signal(name: str, databases: Sequence[Database], carried: Carried) -> list[Found]:

@@ -112,6 +112,24 @@ def bits(
     return value & np.uint64((1 << count) - 1)
 
 
+def parameter_group(identifier: NDArray[np.uint32] | np.uint32) -> NDArray[np.uint32]:
+    """Parameter group number of 29-bit identifiers of SAE J1939 (J1939-21, 5.2).
+
+    Below PDU format 240 the low byte is a destination and no part of it.
+
+    Parameters
+    ----------
+    identifier : (n,) without flags, or one of them
+
+    Returns
+    -------
+    (n,) 18 bits
+    """
+    group = (identifier >> 8) & 0x3FFFF
+    addressed = ((identifier >> 16) & 0xFF) < 240
+    return np.asarray(np.where(addressed, group & 0x3FF00, group), dtype=np.uint32)
+
+
 def in_order(parts: list[Frames]) -> Frames:
     """Frames one part after another, as they were written.
 

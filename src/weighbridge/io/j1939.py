@@ -13,10 +13,9 @@ from fractions import Fraction
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from weighbridge.data import rows_of
-from weighbridge.io.frames import Frames, bits
+from weighbridge.io.frames import Frames, bits, parameter_group
 from weighbridge.io.j1939_transport import assemble
 from weighbridge.signals import Bools, Floats, Problem, Signal, clean_signal, to_si
 from weighbridge.signals.words import counted
@@ -108,7 +107,6 @@ class J1939Summary:
     ----------
     decoded : frames of the groups that were read, by acronym
     ignored : frames of all other groups, by parameter group number
-    sources : source address each signal was taken from; -1 where several agree
     incomplete : multi-packet messages with parts missing
     extras : what has no canonical name, such as shaft speeds; in SI
     problems : what a person should know
@@ -116,7 +114,6 @@ class J1939Summary:
 
     decoded: dict[str, int] = field(default_factory=dict)
     ignored: dict[int, int] = field(default_factory=dict)
-    sources: dict[str, int] = field(default_factory=dict)
     incomplete: int = 0
     extras: dict[str, Signal] = field(default_factory=dict)
     problems: list[Problem] = field(default_factory=list)
@@ -127,24 +124,6 @@ class J1939(NamedTuple):
 
     signals: list[Signal]
     summary: J1939Summary
-
-
-def parameter_group(identifier: NDArray[np.uint32]) -> NDArray[np.uint32]:
-    """Parameter group number of 29-bit identifiers (J1939-21, 5.2).
-
-    Below PDU format 240 the low byte is a destination and no part of it.
-
-    Parameters
-    ----------
-    identifier : (n,) without flags
-
-    Returns
-    -------
-    (n,) 18 bits
-    """
-    group = (identifier >> 8) & 0x3FFFF
-    addressed = ((identifier >> 16) & 0xFF) < 240
-    return np.asarray(np.where(addressed, group & 0x3FF00, group), dtype=np.uint32)
 
 
 def is_j1939(frames: Frames) -> bool:
@@ -232,8 +211,8 @@ class _Reader:
     def note(self, problem: Problem) -> None:
         self.summary.problems.append(problem.at(self.name))
 
-    def senders(self, spn: Spn) -> list[tuple[int, Floats, Floats]]:
-        """Address, stamps and values of each that sends valid values.
+    def senders(self, spn: Spn) -> list[tuple[Floats, Floats]]:
+        """Stamps and values of each that sends valid values.
 
         Those on the engine's bus come first, and of them those that send most.
         """
@@ -248,15 +227,14 @@ class _Reader:
             if which.any():
                 found.append((s, part.time[which], values[which]))
         found.sort(key=lambda f: (f[0] >> 8 != self.bus, -f[1].size, f[0]))
-        return [(s & 0xFF, time, value) for s, time, value in found]
+        return [(time, value) for _, time, value in found]
 
     def best(self, name: str) -> Signal | None:
         """The signal of the sender with the most valid values."""
         senders = self.senders(SPN[name])
         if not senders:
             return None
-        address, time, values = senders[0]
-        self.summary.sources[name] = address
+        time, values = senders[0]
         signal, problems = clean_signal(name, time, values, self.name)
         self.summary.problems += problems
         return signal
@@ -265,7 +243,7 @@ class _Reader:
         """One switch of several: pressed where any says so, each holding its last value."""
         reported = []
         for spn in spns:
-            for _, time, values in self.senders(SPN[spn]):
+            for time, values in self.senders(SPN[spn]):
                 on = is_pressed(spn, values)
                 signal, problems = clean_signal(name, time, on.astype(np.float64), self.name)
                 self.summary.problems += problems
@@ -273,7 +251,6 @@ class _Reader:
                     reported.append(signal)
         if not reported:
             return None
-        self.summary.sources[name] = -1
         time = np.unique(np.concatenate([s.time for s in reported]))
         on = np.array([np.nan_to_num(s.held(time)) for s in reported]).max(axis=0)
         # Senders that speak one shortly after another say nothing new, and would look like a
@@ -327,14 +304,10 @@ def _net_torque(reader: _Reader) -> list[Signal]:
     not forgotten.
     """
     actual = reader.best("actual_torque")
-    reader.summary.sources.pop("actual_torque", None)
     if actual is None:
         return []
-    address = reader.senders(SPN["actual_torque"])[0][0]
-    reader.summary.sources["engine_torque_fraction"] = address
     reader.summary.extras["actual_torque"] = actual
     friction = reader.best("friction_torque")
-    reader.summary.sources.pop("friction_torque", None)
     if friction is None:
         reader.note(Problem.of("torque.friction_unknown", "engine_torque_fraction"))
         return [
@@ -344,7 +317,6 @@ def _net_torque(reader: _Reader) -> list[Signal]:
     reader.summary.extras["friction_torque"] = friction
     lost = np.interp(actual.time, friction.time, friction.values)
     parasitic = reader.best("parasitic_torque")
-    reader.summary.sources.pop("parasitic_torque", None)
     if parasitic is not None:
         # A controller that does not know it sends its lowest code, -125 %.
         reported = np.interp(actual.time, parasitic.time, parasitic.values)
@@ -393,7 +365,6 @@ def _check_distance(reader: _Reader, signals: list[Signal]) -> None:
     """Compare the odometer with the speed, where the way is long enough to."""
     speed = next((s for s in signals if s.name == "vehicle_speed"), None)
     distance = reader.best("distance")
-    reader.summary.sources.pop("distance", None)
     if distance is None:
         return
     reader.summary.extras["distance"] = distance
@@ -415,11 +386,7 @@ def _reported_mass(reader: _Reader) -> Signal | None:
     if found is not None:
         return found
     alone = reader.best("powered_weight")
-    source = reader.summary.sources.pop("powered_weight", None)
-    if alone is None or source is None:
-        return None
-    reader.summary.sources["maker_mass"] = source
-    return Signal("maker_mass", alone.time, alone.values)
+    return None if alone is None else Signal("maker_mass", alone.time, alone.values)
 
 
 def _tell_axle_weights(reader: _Reader) -> None:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from weighbridge.errors import ConfigError
 from weighbridge.io.bus import Decoded, Wanted, canonical_signals, mapped_signals, valid_values
 from weighbridge.io.dbc import Database, Found, message_frames, physical
-from weighbridge.io.frames import Frames, in_order
+from weighbridge.io.frames import Frames, in_order, parameter_group
 from weighbridge.io.isotp import join_messages
 from weighbridge.io.j1939 import (
     EC1,
@@ -29,7 +29,6 @@ from weighbridge.io.j1939 import (
     TP_DT,
     Spn,
     is_pressed,
-    parameter_group,
     spn_values,
 )
 from weighbridge.io.j1939_transport import assemble as assemble_packets
