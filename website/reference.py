@@ -9,7 +9,7 @@ from typing import Any, get_args
 
 from typer.main import get_command
 
-from weighbridge.cli.listed import TellsSources
+from weighbridge.cli.listed import ListsNames
 
 GROUPS = {
     "Weigh": (
@@ -141,8 +141,8 @@ def _tell(command: Any, words: str, lines: list[str]) -> None:
     inside = getattr(command, "commands", None)
     if words != "weighbridge":
         own = getattr(command, "fallback", command)
-        if isinstance(own, TellsSources):
-            own.name_sources()
+        if isinstance(own, ListsNames):
+            own.list_names()
         lines += [f"## {words}", "", _paragraphs(getattr(command, "help", "") or ""), ""]
         rows = [_row(p) for p in own.params if p.name != "help" and not p.hidden]
         if rows:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
-from weighbridge.cli.listed import TellsMethods, argument, method_names, option, slice_names
+from weighbridge.cli.listed import ListsNames, argument, method_names, option, slice_names
 from weighbridge.cli.progress import progress
 from weighbridge.cli.results import Inputs, Result, asked_for, refuse_results, write_json
 from weighbridge.cli.terminal import console, say, shown
@@ -68,7 +68,7 @@ def make(
     say(f"  weighbridge benchmark run {output} -o RESULTS.csv")
 
 
-@app.command(cls=TellsMethods)
+@app.command(cls=ListsNames)
 def run(
     folder: Annotated[Path, argument("benchmark run FOLDER")],
     output: Annotated[Path, option("benchmark run --output")],

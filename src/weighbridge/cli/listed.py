@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from typing import Any, Final
 
 import typer
@@ -39,110 +39,60 @@ def argument(name: str, **settings: Any) -> Any:
     return typer.Argument(help=_WORDS[command or "every"][key], **settings)
 
 
-class TellsMethods(TyperCommand):
-    """A command whose help lists the estimators, read only where help is asked for."""
+class ListsNames(TyperCommand):
+    """A command whose help lists estimators or torque sources, read where help is asked for."""
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
         """Write the help page."""
+        self.list_names()
+        super().format_help(ctx, formatter)
+
+    def list_names(self) -> None:
+        """List the names in the help of ``--method`` and ``--torque`` that has no more words."""
         from weighbridge.estimators import ESTIMATORS
+        from weighbridge.vehicle import TORQUE_SOURCES
 
-        for option in self.params:
-            if isinstance(option, TyperOption) and option.name == "method":
-                option.help = f"Estimator: {ESTIMATORS.names}."
-        super().format_help(ctx, formatter)
-
-
-class TellsSources(TyperCommand):
-    """A command whose help lists the torque sources, read only where help is asked for."""
-
-    def format_help(self, ctx: Any, formatter: Any) -> None:
-        """Write the help page."""
-        self.name_sources()
-        super().format_help(ctx, formatter)
-
-    def name_sources(self) -> None:
-        """List the torque sources in the help of ``--torque``."""
-        for option in self.params:
-            if isinstance(option, TyperOption) and option.name == "torque":
-                option.help = f"Torque source of the drives: {sources()}."
+        sources = ", ".join(f"{s.name} ({s.title})" for s in TORQUE_SOURCES.values())
+        for key, names in {"--method": ESTIMATORS.names, "--torque": sources}.items():
+            words = _WORDS["every"][key]
+            for option in self.params:
+                if isinstance(option, TyperOption) and option.help == words:
+                    option.help = f"{words.removesuffix('.')}: {names}."
 
 
-def sources() -> str:
-    """Each torque source by its name, with what it is."""
-    from weighbridge.vehicle import TORQUE_SOURCES
+def _names(*tables: str, also: tuple[str, ...] = (), end: str = "") -> Callable[[str], list[str]]:
+    """Return the completion of an option by the names of tables, imported when they are asked for.
 
-    return ", ".join(f"{source.name} ({source.title})" for source in TORQUE_SOURCES.values())
+    Parameters
+    ----------
+    tables : such as ``estimators:ESTIMATORS``, within this package
+    also : further names
+    end : behind each name
+    """
 
+    def found(incomplete: str) -> list[str]:
+        from pkgutil import resolve_name
 
-def method_names(incomplete: str) -> list[str]:
-    """Estimators that begin so, for the completion of the shell."""
-    from weighbridge.estimators import ESTIMATORS
+        named = (f"{n}{end}" for t in tables for n in resolve_name(f"weighbridge.{t}"))
+        return [name for name in (*named, *also) if name.startswith(incomplete)]
 
-    return _beginning(ESTIMATORS, incomplete)
-
-
-def source_names(incomplete: str) -> list[str]:
-    """Torque sources that begin so."""
-    from weighbridge.vehicle import TORQUE_SOURCES
-
-    return _beginning(TORQUE_SOURCES, incomplete)
+    return found
 
 
-def class_names(incomplete: str) -> list[str]:
-    """Vehicle classes that begin so."""
-    from weighbridge.vehicle import VEHICLE_CLASSES
-
-    return _beginning(VEHICLE_CLASSES, incomplete)
-
-
-def scenario_names(incomplete: str) -> list[str]:
-    """Scenarios of the simulator that begin so."""
-    from weighbridge.simulation.named import SCENARIOS
-
-    return _beginning((*SCENARIOS, "ride"), incomplete)
-
-
-def effect_names(incomplete: str) -> list[str]:
-    """Effects of the simulator that begin so."""
-    from dataclasses import fields
-
-    from weighbridge.simulation.scenario import Effects
-
-    return _beginning((f.name for f in fields(Effects)), incomplete)
-
-
-def filter_names(incomplete: str) -> list[str]:
-    """Filters of the ride that begin so."""
-    from weighbridge.inertia import METHODS
-
-    return _beginning(METHODS, incomplete)
-
-
-def paper_names(incomplete: str) -> list[str]:
-    """Papers that begin so."""
-    from weighbridge.papers import PAPERS
-
-    return _beginning((*PAPERS, "all"), incomplete)
-
-
-def slice_names(incomplete: str) -> list[str]:
-    """Slices of the benchmark that begin so."""
-    from weighbridge.benchmark.plan import CALIBRATIONS, CLASSES, EQUIPMENT
-
-    return _beginning((*CLASSES, *EQUIPMENT, *CALIBRATIONS), incomplete)
-
-
-def source_kinds(incomplete: str) -> list[str]:
-    """Kinds of live sources that begin so, with the colon behind them."""
-    from weighbridge.live import SOURCES
-
-    return _beginning((f"{name}:" for name in SOURCES), incomplete)
+method_names: Final = _names("estimators:ESTIMATORS")
+source_names: Final = _names("vehicle:TORQUE_SOURCES")
+class_names: Final = _names("vehicle:VEHICLE_CLASSES")
+scenario_names: Final = _names("simulation.named:SCENARIOS", also=("ride",))
+effect_names: Final = _names("simulation.scenario:Effects.__dataclass_fields__")
+filter_names: Final = _names("inertia:METHODS")
+paper_names: Final = _names("papers:PAPERS", also=("all",))
+slice_names: Final = _names(
+    *(f"benchmark.plan:{t}" for t in ("CLASSES", "EQUIPMENT", "CALIBRATIONS"))
+)
+source_kinds: Final = _names("live:SOURCES", end=":")
+"""Completions for the shell."""
 
 
 def one_of(*names: str) -> Callable[[str], list[str]]:
     """Return the completion of an option that takes one of these names."""
-    return lambda incomplete: _beginning(names, incomplete)
-
-
-def _beginning(names: Iterable[str], incomplete: str) -> list[str]:
-    return [name for name in names if name.startswith(incomplete)]
+    return _names(also=names)

@@ -35,7 +35,7 @@ from weighbridge.cli import (
     vehicle,
     weigh,
 )
-from weighbridge.cli.listed import TellsMethods, TellsSources, option
+from weighbridge.cli.listed import ListsNames, option
 from weighbridge.cli.terminal import STREAM, complain, guarded, leave_quietly, say
 from weighbridge.cli.verbosity import EveryCommand, Quiet, Verbose, asked_anew
 from weighbridge.errors import WeighbridgeError
@@ -57,8 +57,8 @@ app = typer.Typer(
 
 app.command()(demo.demo)
 app.command()(inspect.inspect)
-app.command(cls=TellsSources)(calibrate.calibrate)
-app.command(cls=TellsMethods)(weigh.weigh)
+app.command(cls=ListsNames)(calibrate.calibrate)
+app.command(cls=ListsNames)(weigh.weigh)
 app.command()(live.live)
 app.command()(inertia.inertia)
 app.command()(bound.bound)

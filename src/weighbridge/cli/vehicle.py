@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Optional
 
 import typer
 
-from weighbridge.cli.listed import TellsSources, argument, class_names, one_of, option, source_names
+from weighbridge.cli.listed import ListsNames, argument, class_names, one_of, option, source_names
 from weighbridge.cli.options import MappingPath
 from weighbridge.cli.results import Result, inputs, refuse_overwriting, refuse_results
 from weighbridge.cli.terminal import console, say, shown
@@ -23,7 +23,7 @@ _Text = Optional[str]  # noqa: UP045  (typer reads the annotation at run time)
 _Number = Optional[float]  # noqa: UP045
 
 
-@app.command(cls=TellsSources)
+@app.command(cls=ListsNames)
 def new(
     output: Annotated[Path, option("--output")],
     kind: Annotated[str, option("vehicle --class", autocompletion=class_names)] = "car",
