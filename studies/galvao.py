@@ -31,7 +31,7 @@ from weighbridge.calibration.speed_fit import SpeedRows
 from weighbridge.estimators.speed_ekf import SpeedEkfSettings, mean_mass, run_filter, start_share
 from weighbridge.papers import galvao as paper
 from weighbridge.papers.claims import Verdict
-from weighbridge.papers.galvao_figures import item_figures
+from weighbridge.papers.galvao import item_figures
 from weighbridge.report.table import Table
 from weighbridge.simulation import Route, jensen_route, mixed_route, random_car, simulate_car
 from weighbridge.vehicle.model import Vehicle

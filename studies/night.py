@@ -57,8 +57,7 @@ from weighbridge.live.feed import Feed
 from weighbridge.live.keeper import Keeper
 from weighbridge.live.outputs import Outputs
 from weighbridge.live.outputs.lines import Lines
-from weighbridge.live.outputs.mqtt import Mqtt, parse_broker
-from weighbridge.live.outputs.outbox import Outbox
+from weighbridge.live.outputs.mqtt import Mqtt, Outbox, parse_broker
 from weighbridge.live.recordings import Recordings
 from weighbridge.live.scale import LiveScale
 from weighbridge.live.session import Session

@@ -59,7 +59,7 @@ def test_a_row_keeps_the_running_mass_at_set_instants_and_the_way_of_each_period
     tmp_path, short_drive, short_car, monkeypatch
 ):
     monkeypatch.setattr("weighbridge.fleet.facts.CHECKS", (150.0, 60.0))
-    monkeypatch.setattr("weighbridge.fleet.travel.PERIOD", 60.0)
+    monkeypatch.setattr("weighbridge.fleet.facts.PERIOD", 60.0)
     drives, cars = real_fleet(tmp_path, short_drive.drive, short_car, 1)
     (job,) = jobs(tmp_path, drives, cars)
     (row,) = rows(job, weigh_job(job)).to_dicts()

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from weighbridge import Drive, Signal
-from weighbridge.fleet.travel import Travel
+from weighbridge.fleet.facts import Travel
 
 CLOCK = np.arange(0.0, 900.0)
 STANDS = ((0.0, 60.0), (300.0, 400.0), (600.0, 660.0), (840.0, 899.0))

@@ -4,7 +4,7 @@ import datetime as dt
 
 import numpy as np
 
-from weighbridge.live.emulator.sent import InertialLines, Sentences
+from weighbridge.live.emulator import InertialLines, Sentences
 from weighbridge.live.sources.lines import LineReader
 from weighbridge.live.sources.nmea import SentenceReader
 from weighbridge.signals import QUANTITIES

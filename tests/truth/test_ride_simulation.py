@@ -10,7 +10,7 @@ from scipy.signal import csd, welch
 
 from weighbridge import ConfigError
 from weighbridge.simulation import TRUCK, RideScenario, RideSensors, simulate_ride
-from weighbridge.simulation.ride_road import BAND, ROUGHNESS, coherence, draw_road
+from weighbridge.simulation.ride import BAND, ROUGHNESS, coherence, draw_road
 
 SETTLING = 6.0
 """The road begins so long before the first sample [s]."""

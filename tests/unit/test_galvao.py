@@ -12,6 +12,7 @@ from weighbridge import ConfigError
 from weighbridge.constants import GRAVITY
 from weighbridge.estimators import changed, parsed
 from weighbridge.papers import PAPERS, galvao
+from weighbridge.papers.galvao import PAPER_WORST, item_figures
 from weighbridge.papers.galvao_bounds import (
     FAST,
     SLOW,
@@ -20,7 +21,6 @@ from weighbridge.papers.galvao_bounds import (
     speed_says,
     speed_table,
 )
-from weighbridge.papers.galvao_figures import PAPER_WORST, item_figures
 from weighbridge.simulation import COMPACT
 
 DRIVES = import_module(galvao.easy_route.__module__)

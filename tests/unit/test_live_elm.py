@@ -10,7 +10,7 @@ from tests.noted import error
 from weighbridge import ConfigError
 from weighbridge.errors import SourceError
 from weighbridge.live import Feed, parse_source
-from weighbridge.live.sources.elm_text import read_reply, read_voltage
+from weighbridge.live.sources.elm import read_reply, read_voltage
 
 elmulator = pytest.importorskip("elmulator")
 pytest.importorskip("serialx")

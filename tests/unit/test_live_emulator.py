@@ -17,8 +17,8 @@ from weighbridge.errors import SourceError
 from weighbridge.io import read_sentence
 from weighbridge.io.obd import LENGTHS, PIDS, bytes_of, parameters_of, values_of
 from weighbridge.live import Feed, Played, clock, devices, parse_source
-from weighbridge.live.emulator.sent import InertialLines, Sentences
-from weighbridge.live.sources.elm_text import read_reply
+from weighbridge.live.emulator import InertialLines, Sentences
+from weighbridge.live.sources.elm import read_reply
 from weighbridge.live.sources.lines import LineReader
 from weighbridge.live.sources.schedule import supported_of
 

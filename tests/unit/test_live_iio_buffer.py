@@ -11,8 +11,7 @@ from tests.noted import error
 
 from weighbridge.errors import SourceError
 from weighbridge.live import Feed
-from weighbridge.live.sources.iio import IioSource
-from weighbridge.live.sources.iio_scan import Element, Scan, read_type
+from weighbridge.live.sources.iio import Element, IioSource, Scan, read_type
 
 AXES = tuple(f"in_{kind}_{axis}" for kind in ("accel", "anglvel") for axis in "xyz")
 BEFORE = {

@@ -31,7 +31,7 @@ from weighbridge.io.j1939 import (
     is_pressed,
     spn_values,
 )
-from weighbridge.io.j1939_transport import assemble as assemble_packets
+from weighbridge.io.j1939 import assemble as assemble_packets
 from weighbridge.io.mapping import TableMapping
 from weighbridge.io.obd import parameters_of, values_of
 from weighbridge.signals import Floats, to_si
