@@ -31,12 +31,13 @@ from weighbridge.papers.jensen2022_drives import (
     without_weather,
 )
 from weighbridge.papers.jensen2022_judged import BAND, DriveResult, judge, judge_track
-from weighbridge.papers.jensen2022_printed import (
+from weighbridge.papers.jensen2022_reproduction import (
     PrintedSettings,
+    Reproduction,
+    reproduce,
     train,
     weigh_as_printed,
 )
-from weighbridge.papers.jensen2022_reproduction import Reproduction, reproduce
 from weighbridge.pipeline.weighing import weigh
 from weighbridge.simulation import make_scenario, simulate_car
 

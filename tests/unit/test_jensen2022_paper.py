@@ -24,7 +24,7 @@ from weighbridge.papers.jensen2022_drives import (
     scenario,
 )
 from weighbridge.papers.jensen2022_judged import joined, torques
-from weighbridge.papers.jensen2022_printed import train
+from weighbridge.papers.jensen2022_reproduction import train
 from weighbridge.papers.jensen2022_tables import (
     WEIGHT_UNITS,
     parameters_table,

@@ -16,7 +16,7 @@ from weighbridge.kernels import ins_printed as kernel
 from weighbridge.kernels import rls
 from weighbridge.kernels.rotation import euler_to_quaternion
 from weighbridge.navigation import PrintedFilterSettings
-from weighbridge.papers.jensen2022_printed import (
+from weighbridge.papers.jensen2022_reproduction import (
     PrintedSettings,
     train,
     weigh_as_printed,

@@ -36,9 +36,15 @@ from weighbridge.papers.du2025_methods import (
     Settings,
     setting_rows,
 )
-from weighbridge.papers.du2025_results import DriveResult, Opposite, Reproduction, cell
-from weighbridge.papers.du2025_running import CONVERGED as CONVERGED
-from weighbridge.papers.du2025_running import running_error, steady_from
+from weighbridge.papers.du2025_results import CONVERGED as CONVERGED
+from weighbridge.papers.du2025_results import (
+    DriveResult,
+    Opposite,
+    Reproduction,
+    cell,
+    running_error,
+    steady_from,
+)
 from weighbridge.papers.reproduced import Progress, Reproduced, rms
 from weighbridge.pipeline.weighing import weigh
 from weighbridge.report.style import BLUE, GREY, VERMILLION, Panel, blank, line

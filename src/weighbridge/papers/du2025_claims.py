@@ -10,8 +10,13 @@ import numpy as np
 
 from weighbridge.papers.du2025_bus import LOADS
 from weighbridge.papers.du2025_methods import BAND, METHODS, PAPER_RMSE, PAPER_TIME
-from weighbridge.papers.du2025_results import DriveResult, Reproduction, cell
-from weighbridge.papers.du2025_running import CONVERGED, RunningError
+from weighbridge.papers.du2025_results import (
+    CONVERGED,
+    DriveResult,
+    Reproduction,
+    RunningError,
+    cell,
+)
 from weighbridge.signals import Floats
 
 LEAST, KALMAN, BLEND = METHODS

@@ -12,10 +12,11 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from weighbridge.balance import ForceBalance
 from weighbridge.balance.speed_balance import speed_balance
 from weighbridge.calibration import SpeedCalibration
 from weighbridge.calibration.speed import calibrate_by_speed, speed_rows
-from weighbridge.calibration.speed_fit import Nominal, model_speed
+from weighbridge.calibration.speed_fit import Nominal, SpeedRows, model_speed
 from weighbridge.estimators.speed_ekf import (
     PRINTED,
     FilterRun,
@@ -25,7 +26,7 @@ from weighbridge.estimators.speed_ekf import (
 )
 from weighbridge.estimators.speed_torque_ekf import SpeedTorqueSettings
 from weighbridge.papers.claims import Found, items_of, read_rows, same
-from weighbridge.papers.galvao_bounds import speed_says, speed_table
+from weighbridge.papers.galvao_bounds import SpeedSays, speed_says, speed_table
 from weighbridge.papers.galvao_drives import (
     CAR,
     NOMINAL,
@@ -35,11 +36,12 @@ from weighbridge.papers.galvao_drives import (
     with_grade,
 )
 from weighbridge.papers.galvao_equations import equations
-from weighbridge.papers.galvao_results import Reproduction, Test, Trial
-from weighbridge.papers.galvao_statistics import rank_correlation, slope
 from weighbridge.papers.galvao_torque import (
     BOUND,
     FROM_PRINTED_START,
+    TorqueTrial,
+    rank_correlation,
+    slope,
     torque_figures,
     torque_table,
     torque_trial,
@@ -74,6 +76,96 @@ if TYPE_CHECKING:
     import plotly.graph_objects as go
 
     from weighbridge.simulation import SimulatedDrive
+
+LAST: Final = 200
+"""Samples over which Table 2 gives the band."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Test:
+    """One of the three drives.
+
+    Attributes
+    ----------
+    number : 1 to 3
+    mass : true mean [kg]
+    balance : windows of the drive
+    rows : the same with the true grade
+    predicted : (n,) speed of the model one window ahead, with the true grade [m/s]
+    ours, printed : runs of the filter started at the calibration's mass with a
+        constant mass, and with start and noise as printed
+    """
+
+    number: int
+    mass: float
+    balance: ForceBalance
+    rows: SpeedRows
+    predicted: Floats
+    ours: FilterRun
+    printed: FilterRun
+
+    def error(self, run: FilterRun) -> float:
+        """Relative error of the mean mass of a run [-]."""
+        return run.answer / self.mass - 1.0
+
+    @property
+    def superimposed(self) -> tuple[float, float]:
+        """How far the model's speed is off, RMS [m/s], and the part of the speed it explains."""
+        known = np.isfinite(self.predicted)
+        left = (self.rows.speed - self.predicted)[known]
+        part = 1.0 - np.var(left) / np.var(self.rows.speed[known])
+        return float(np.sqrt(np.mean(left**2))), float(part)
+
+    def band(self, run: FilterRun) -> float:
+        """Widest half of the 95 % band over the last samples used [kg]."""
+        return float(np.max(1.96 * run.std[run.used][-LAST:]))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Trial:
+    """Drives that the paper did not try, of one kind.
+
+    Attributes
+    ----------
+    kind : what is different
+    masses : true masses [kg]
+    answers : of our settings [kg]
+    pinned : of the filter that starts from nothing and knows the road to be level [kg]
+    """
+
+    kind: str
+    masses: Floats
+    answers: Floats
+    pinned: Floats
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Reproduction:
+    """All the figures of the study.
+
+    Attributes
+    ----------
+    vehicle : with the speed model fitted to the first drive
+    r_squared : of the fit
+    tests : the three drives
+    starts : masses the filter is started from, and where the second drive ends then, by ours and
+        with noise as printed [kg]
+    stated : masses the calibration is given, and what the second drive weighs then [kg], and R² of
+        the fit
+    trials : drives the paper did not try
+    torque : the tests with the torque recorded
+    says : what speed alone says in the tests
+    """
+
+    vehicle: Vehicle
+    r_squared: float
+    tests: tuple[Test, ...]
+    starts: tuple[tuple[float, float, float], ...]
+    stated: tuple[tuple[float, float, float], ...]
+    trials: tuple[Trial, ...]
+    torque: TorqueTrial
+    says: SpeedSays
+
 
 PAPER_WORST: Final = 0.0033
 """Largest error of Table 1 [-]."""

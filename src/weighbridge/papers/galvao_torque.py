@@ -7,17 +7,41 @@ from dataclasses import dataclass, fields, replace
 from typing import Final
 
 import numpy as np
+from scipy.stats import spearmanr
 
 from weighbridge.calibration import CalibrationSettings, run_calibration
 from weighbridge.estimators.speed_torque_ekf import SpeedTorqueSettings
 from weighbridge.papers.claims import Found
 from weighbridge.papers.galvao_drives import CAR, mass_of, scenario, with_grade
-from weighbridge.papers.galvao_statistics import slope
 from weighbridge.pipeline.weighing import weigh
 from weighbridge.report.table import Table
 from weighbridge.signals import Drive, Floats
 from weighbridge.simulation import Polling, Route, simulate_car
 from weighbridge.vehicle import Driveline, Vehicle
+
+
+def slope(masses: Floats, answers: Floats) -> tuple[float, float]:
+    """Regress answers on true masses.
+
+    Parameters
+    ----------
+    masses, answers : (n,) [kg]
+
+    Returns
+    -------
+    slope, std : kg answered per kg loaded, and its standard error [-]
+    """
+    away = masses - masses.mean()
+    power = float(np.sum(away**2))
+    found = float(away @ answers) / power
+    residual = answers - answers.mean() - found * away
+    return found, float(np.sqrt(residual @ residual / (masses.size - 2) / power))
+
+
+def rank_correlation(masses: Floats, answers: Floats) -> float:
+    """Spearman's: 1 where heavier drives always get heavier answers; wild answers do no harm."""
+    return float(spearmanr(masses, answers).statistic)
+
 
 METHOD: Final = "speed-torque-ekf"
 

@@ -31,7 +31,7 @@ from weighbridge.kernels.rotation import (
 )
 from weighbridge.navigation import PrintedFilterSettings
 from weighbridge.papers.claims import Found, same
-from weighbridge.papers.jensen2022_printed import PrintedSettings
+from weighbridge.papers.jensen2022_reproduction import PrintedSettings
 from weighbridge.papers.point import ACCEL, DENSITY, GRADE, SPEED, point_table
 from weighbridge.signals import Floats
 from weighbridge.vehicle import (

@@ -10,9 +10,8 @@ import plotly.graph_objects as go
 from scipy.stats import gaussian_kde
 
 from weighbridge.estimators import run_in_turn
-from weighbridge.papers.jensen2022_gradient import gradient_panel
 from weighbridge.papers.jensen2022_judged import BAND, DriveResult, Torques, joined, kilometres
-from weighbridge.papers.jensen2022_reproduction import LOADED, Reproduction, Sample
+from weighbridge.papers.jensen2022_reproduction import LOADED, Reproduction, Sample, gradient_panel
 from weighbridge.papers.jensen2022_tables import (
     PERTURBED_DRIVE,
     highways,

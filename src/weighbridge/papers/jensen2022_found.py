@@ -16,10 +16,13 @@ from weighbridge.navigation import PrintedFilterSettings
 from weighbridge.papers.claims import Found, same
 from weighbridge.papers.jensen2022_drives import TABLE_B1
 from weighbridge.papers.jensen2022_equations import equations
-from weighbridge.papers.jensen2022_gradient import gradient_figures
 from weighbridge.papers.jensen2022_judged import BAND, ONE_DEGREE, DriveResult, joined, within
-from weighbridge.papers.jensen2022_printed import TYRE_RADIUS, PrintedSettings
-from weighbridge.papers.jensen2022_reproduction import Reproduction
+from weighbridge.papers.jensen2022_reproduction import (
+    TYRE_RADIUS,
+    PrintedSettings,
+    Reproduction,
+    gradient_figures,
+)
 from weighbridge.papers.jensen2022_tables import (
     PAPER_R_SQUARED,
     ROAD_UNITS,

@@ -16,10 +16,10 @@ from weighbridge.inertia import AXES, InertiaTrack, RideSamples, estimate, ride_
 from weighbridge.papers import nguyen2024_cases as cases
 from weighbridge.papers.claims import Found, items_of, listed, read_rows, same
 from weighbridge.papers.nguyen2024_cases import Case, Settings
+from weighbridge.papers.nguyen2024_cases import RideResult as RideResult
+from weighbridge.papers.nguyen2024_cases import judge as judge
+from weighbridge.papers.nguyen2024_cases import suspension_of as suspension_of
 from weighbridge.papers.nguyen2024_equations import equations
-from weighbridge.papers.nguyen2024_judged import RideResult as RideResult
-from weighbridge.papers.nguyen2024_judged import judge as judge
-from weighbridge.papers.nguyen2024_judged import suspension_of as suspension_of
 from weighbridge.papers.reproduced import Progress, Reproduced
 from weighbridge.report.table import Table
 from weighbridge.signals import Floats

@@ -14,8 +14,13 @@ import numpy as np
 from weighbridge.inertia import Method, accelerations, fixed_params
 from weighbridge.kernels import kalman_bucy
 from weighbridge.papers.claims import Found, same
-from weighbridge.papers.nguyen2024_cases import AS_PRINTED, PAPERS_SENSORS, Settings
-from weighbridge.papers.nguyen2024_judged import judge, suspension_of
+from weighbridge.papers.nguyen2024_cases import (
+    AS_PRINTED,
+    PAPERS_SENSORS,
+    Settings,
+    judge,
+    suspension_of,
+)
 from weighbridge.signals import Floats
 from weighbridge.simulation import TRUCK, system
 
