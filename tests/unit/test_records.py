@@ -23,7 +23,7 @@ def taken(samples, *, whole):
             records.add("vehicle_speed", time, value)
     counts = (records.late, records.unfit, records.jumps, records.newest, records.oldest)
     records.seal(math.inf)
-    signal = records.drive("live", DriveInfo()).signals.get("vehicle_speed")
+    signal = records.drive(DriveInfo()).signals.get("vehicle_speed")
     return counts, signal.time if signal is not None else np.empty(0)
 
 
@@ -78,7 +78,7 @@ def test_a_look_at_what_waits_leaves_nothing_behind():
     records = Records(LATENESS)
     records.add("ambient_temperature", NEWEST, 20.0)
     records.seal(NEWEST + 1.0)
-    assert records.last(10.0, 1)["ambient_temperature"][0].size == 1
+    assert records.last(10.0)["ambient_temperature"][0].size == 1
     assert records.waiting_from == math.inf
 
 

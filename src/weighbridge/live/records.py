@@ -299,12 +299,14 @@ class Records:
         self.forget(before, 0)
         self.oldest = max(self.oldest, before)
 
-    def last(self, span: float, fewest: int) -> dict[str, tuple[Floats, Floats]]:
-        """Samples of the last ``span`` [s], ``fewest`` of each signal at least, open ones too."""
+    def last(self, span: float) -> dict[str, tuple[Floats, Floats]]:
+        """Samples of the last ``span`` [s], `FEWEST_SAMPLES` of each signal at least, open ones."""
         found = {}
         for name, column in self._columns.items():
             time, values = column.sealed
-            keep = max(min(int(time.searchsorted(self.newest - span)), time.size - fewest), 0)
+            keep = max(
+                min(int(time.searchsorted(self.newest - span)), time.size - FEWEST_SAMPLES), 0
+            )
             more = column.waiting()
             found[name] = (
                 np.concatenate([time[keep:], more[0]]),
@@ -312,21 +314,21 @@ class Records:
             )
         return found
 
-    def drive(self, name: str, info: DriveInfo) -> Drive:
+    def drive(self, info: DriveInfo) -> Drive:
         """Sealed samples as a drive, which shares their memory."""
         return Drive(
-            name,
+            "live",
             {n: Signal(n, *c.sealed) for n, c in self._columns.items() if c.last > c.first},
             info,
         )
 
-    def so_far(self, name: str, info: DriveInfo, span: float, fewest: int) -> Drive:
+    def so_far(self, info: DriveInfo, span: float) -> Drive:
         """Samples of the last ``span`` [s] as a drive, `last`, late ones may still come."""
         return Drive(
-            name,
+            "live",
             {
                 n: Signal(n, *_in_order(*pair))
-                for n, pair in self.last(span, fewest).items()
+                for n, pair in self.last(span).items()
                 if pair[0].size
             },
             info,

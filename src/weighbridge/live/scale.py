@@ -168,7 +168,7 @@ class LiveScale:
             self._take(wait=True)
         move = self._move
         if self._learns and move.driven > max(move.looked_at, FIRST) and self._next is not None:
-            self._learn(self._records.drive("live", self.info), last)
+            self._learn(self._records.drive(self.info), last)
             self._take(wait=True)
 
     def __del__(self) -> None:
@@ -194,7 +194,7 @@ class LiveScale:
             "step": self._every,
             "info": self.info,
             "learned": None if self._learned is None else self._learned.answer(),
-            "samples": self._records.last(self._behind + 2.0 * self._every, FEWEST_SAMPLES),
+            "samples": self._records.last(self._behind + 2.0 * self._every),
         }
         return packed(content, self.vehicle)
 
@@ -246,7 +246,7 @@ class LiveScale:
 
     def recorded(self) -> Drive:
         """Samples that are kept as a drive: the last `LONGEST` seconds where the scale learns."""
-        return self._records.drive("live", self.info)
+        return self._records.drive(self.info)
 
     def tare(self) -> float:
         """Set the mass of this moment to nought, for the payload; return it [kg].
@@ -400,7 +400,7 @@ class LiveScale:
         state, setup, records = self._state, self._setup, self._records
         if state is None or setup is None or not state.joint.windows:
             return state
-        seen = records.so_far("live", self.info, self._behind + self._every, FEWEST_SAMPLES)
+        seen = records.so_far(self.info, self._behind + self._every)
         return forward.looked_ahead(state, seen, records.newest, setup)
 
     @property
@@ -499,7 +499,7 @@ class LiveScale:
                 self._next = first_instant(self._records.waiting_from, self._every)
 
     def _step(self, until: float, length: float) -> None:
-        drive = self._records.drive("live", self.info)
+        drive = self._records.drive(self.info)
         seen = recent(drive, until, length + self._behind - BEHIND)
         moved = moves(seen, until)
         still = stands(seen, until)

@@ -47,7 +47,6 @@ class DriveResult:
     error : relative error of the final mass: of the weighing, else the running mass at the end [-]
     covered : the 95 % interval holds the true mass; False without a weighing
     grade_rms, pitch_rms : errors while moving [rad]
-    pitch_std : of the pitch error, the constant lean under load aside [rad]
     pitch_largest : largest error of the pitch while moving [rad]
     pitch_within : part of the moving time with less than 1 degree [-]
     grade_largest, grade_within : the same of the slope of the road
@@ -65,7 +64,6 @@ class DriveResult:
     covered: bool
     grade_rms: float
     pitch_rms: float
-    pitch_std: float
     pitch_largest: float
     pitch_within: float
     grade_largest: float
@@ -121,7 +119,6 @@ def judge_track(
         covered=covered,
         grade_rms=rms(grade),
         pitch_rms=rms(pitch),
-        pitch_std=float(np.std(pitch)),
         pitch_largest=float(np.max(np.abs(pitch))),
         pitch_within=float(np.mean(np.abs(pitch) < ONE_DEGREE)),
         grade_largest=float(np.max(np.abs(grade))),
