@@ -114,7 +114,7 @@ MUTANTS = (
         ("tests/live/test_alerts.py",),
     ),
     Mutant(
-        "fleet/travel.py",
+        "fleet/facts.py",
         "return np.asarray(found[found[:, 1] - found[:, 0] >= SHORTEST])",
         "return np.asarray(found[found[:, 1] - found[:, 0] >= SHORTEST][1:])",
         "a row dropped",

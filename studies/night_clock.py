@@ -247,14 +247,13 @@ def on_clock(clock: Clock, wall: Callable[[], float]) -> Iterator[Threads]:
     """
     from weighbridge.live import clock as of_live
     from weighbridge.live import feed, keeper, looking, recorder, recordings, session
-    from weighbridge.live.outputs import mqtt, outbox
+    from weighbridge.live.outputs import mqtt
     from weighbridge.live.sources import elm, polling, receiver
 
     threads = Threads(clock)
     places = {
         feed: ("Condition", "Event", "Lock", "Thread"),
-        mqtt: ("Condition", "Event", "Thread"),
-        outbox: ("Lock",),
+        mqtt: ("Condition", "Event", "Lock", "Thread"),
         looking: ("Thread",),
         recorder: ("ThreadPoolExecutor", "wait"),
         recordings: ("ThreadPoolExecutor",),

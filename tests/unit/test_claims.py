@@ -20,11 +20,10 @@ from weighbridge.papers import (
     document,
     du2025,
     galvao,
-    galvao_figures,
     items_of,
     jensen2022,
     jensen2022_found,
-    jensen2022_printed,
+    jensen2022_reproduction,
     nguyen2024,
     settings_of,
 )
@@ -36,7 +35,7 @@ PAGE = Path(__file__).parents[2] / "docs" / "papers.md"
 
 EQUATIONS = {
     "du2025": du2025.equations,
-    "galvao": galvao_figures.equations,
+    "galvao": galvao.equations,
     "jensen2022": jensen2022_found.equations,
     "nguyen2024": nguyen2024.equations,
 }
@@ -223,14 +222,14 @@ def fresh_du2025():
 
 
 def fresh_galvao():
-    return galvao_figures.of_tests(galvao.weigh_three(galvao.SEED)[2])
+    return galvao.of_tests(galvao.weigh_three(galvao.SEED)[2])
 
 
 def fresh_jensen2022():
     made = simulate_car(make_scenario("car-calibration", seed=jensen2022.SEED))
     mass = float(np.mean(made.truth.mass))
     printed = jensen2022.Settings().printed
-    car = jensen2022_printed.train(without_weather(made.drive), mass, printed)
+    car = jensen2022_reproduction.train(without_weather(made.drive), mass, printed)
     return jensen2022_found.of_fit("printed", car.vehicle, car.r_squared)
 
 

@@ -4,7 +4,7 @@ K. M. Jensen, I. F. Santos, L. K. H. Clemmensen, S. Theodorsen, H. J. P. Corsten
 Mass estimation of ground vehicles based on longitudinal dynamics using IMU and
 CAN-bus data, Mechanical Systems and Signal Processing 171, 2022, 108925.
 
-Each drive is weighed twice: by the paper's own rules (`jensen2022_printed`) and by ``rls`` as
+Each drive is weighed twice: by the paper's own rules, as printed, and by ``rls`` as
 weighbridge has it, with its own navigation and calibration.
 """
 
