@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 from weighbridge.cli.listed import argument, option
 from weighbridge.cli.options import DbcPaths, MappingPath, load
-from weighbridge.cli.terminal import console, say
-from weighbridge.cli.verbosity import notice, watched
+from weighbridge.cli.progress import in_place
+from weighbridge.cli.terminal import say
+from weighbridge.cli.verbosity import notice
 
 if TYPE_CHECKING:
     from weighbridge.live import Played
@@ -48,37 +49,12 @@ def emulate(
         live = ["weighbridge live --vehicle VEHICLE.toml", *(f"--source {s}" for s in sources)]
         say(" ".join(live if rate == 1.0 else [*live, f"--rate {rate:g}"]))
         notice("the vehicle begins to drive when this is typed in another terminal")
-        with _Progress(played) as progress:
+        with in_place() as draw:
             while not played.ended:
                 if played.begun.wait(_GLANCE):
-                    progress.draw()
+                    draw(lambda: progress_text(played))
                     stop.wait(_GLANCE)
         notice("the drive is over; end the other command with q or Ctrl-C")
-
-
-class _Progress:
-    """How much of the drive is over, in place on a terminal; nothing elsewhere."""
-
-    def __init__(self, played: Played) -> None:
-        from rich.live import Live
-
-        screen = console(stderr=True)
-        self._played = played
-        self._live = Live(console=screen, auto_refresh=False) if watched() else None
-
-    def __enter__(self) -> _Progress:
-        if self._live is not None:
-            self._live.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        if self._live is not None:
-            self._live.stop()
-
-    def draw(self) -> None:
-        """Draw what is over by now."""
-        if self._live is not None:
-            self._live.update(progress_text(self._played), refresh=True)
 
 
 def progress_text(played: Played) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import signal
 from pathlib import Path
 from threading import Event
 from typing import TYPE_CHECKING, Annotated
@@ -28,7 +27,7 @@ from weighbridge.cli.results import (
     refuse_overwriting,
     refuse_results,
 )
-from weighbridge.cli.terminal import complain, console, say
+from weighbridge.cli.terminal import complain, console, ended_by_signals, say
 from weighbridge.cli.verbosity import notice, quiet
 
 if TYPE_CHECKING:
@@ -350,15 +349,8 @@ def _run(session: Session, pressed: Callable[[], str], ordered: OrderFile | None
                 complain(order(scale, word))
 
     session.orders = orders
-    before = {
-        number: signal.signal(number, lambda *_: stop.set())
-        for number in (signal.SIGINT, signal.SIGTERM)
-    }
-    try:
+    with ended_by_signals(stop):
         return session.run(stop)
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 def _calibrate(scale: LiveScale, ticket: float, car: Vehicle, out: Path) -> None:

@@ -119,6 +119,18 @@ def progress(what: str, total: float = 0.0) -> Iterator[Bar]:
 
 
 @contextlib.contextmanager
+def in_place() -> Iterator[Callable[[Callable[[], Any]], None]]:
+    """Hand over what draws in place what a function makes: on a terminal, on standard error."""
+    if not watched():
+        yield lambda make: None
+        return
+    from rich.live import Live
+
+    with Live(console=console(stderr=True), auto_refresh=False, redirect_stdout=False) as live:
+        yield lambda make: live.update(make(), refresh=True)
+
+
+@contextlib.contextmanager
 def compiling(bar: Bar) -> Iterator[None]:
     """Let a bar say so while kernels are compiled, which only the first run does."""
     from numba.core import event

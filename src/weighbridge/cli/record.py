@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import contextlib
 import select
-import signal
 import sys
-import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
+from threading import Event
 from time import monotonic
 from typing import TYPE_CHECKING, Annotated, Final
 
@@ -21,7 +20,8 @@ from weighbridge.cli.options import (
     MappingPath,
     SplitMb,
 )
-from weighbridge.cli.terminal import complain, console
+from weighbridge.cli.progress import in_place
+from weighbridge.cli.terminal import complain, console, ended_by_signals
 from weighbridge.cli.verbosity import notice, say_written, watched
 from weighbridge.errors import ConfigError, DriveError
 
@@ -77,8 +77,9 @@ def record(
     with recorder, Feed(sources) as feed:
         look(feed, needs(car), check)
         until = monotonic() + duration if duration is not None else float("inf")
-        with _ended() as ended:
-            arrived = run(feed, recorder, lambda: ended() or monotonic() >= until)
+        stop = Event()
+        with ended_by_signals(stop):
+            arrived = run(feed, recorder, lambda: stop.is_set() or monotonic() >= until)
     if recorder.problem:
         raise DriveError(recorder.problem)
     if not arrived.count:
@@ -104,10 +105,10 @@ def look(feed: Feed, wanted: tuple[Need, ...], seconds: float) -> None:
         return
     arrivals = Arrivals()
     begun = monotonic()
-    with _table(wanted, arrivals) as draw:
+    with in_place() as draw:
         while not feed.ended and monotonic() - begun < seconds:
             arrivals.add(feed.read(_WAIT))
-            draw()
+            draw(lambda: arrival_table(wanted, arrivals))
             whole = not any(arrivals.of(need).lacking for need in wanted)
             if whole and monotonic() - begun >= min(_LEAST_CHECK, seconds):
                 break
@@ -179,19 +180,6 @@ def _reported(feed: Feed, arrivals: Arrivals, seconds: float) -> str:
     return "; ".join((f"{text}signals, Ctrl-C ends", *lost))
 
 
-@contextlib.contextmanager
-def _table(wanted: tuple[Need, ...], arrivals: Arrivals) -> Iterator[Callable[[], None]]:
-    """Show on a terminal what arrives; nothing elsewhere."""
-    screen = console(stderr=True)
-    if not watched():
-        yield lambda: None
-        return
-    from rich.live import Live
-
-    with Live(console=screen, auto_refresh=False, redirect_stdout=False) as live:
-        yield lambda: live.update(arrival_table(wanted, arrivals), refresh=True)
-
-
 def arrival_table(wanted: tuple[Need, ...], arrivals: Arrivals) -> Table:
     """Lay out what is needed, whether it comes and how fast."""
     from rich.table import Table
@@ -208,19 +196,3 @@ def arrival_table(wanted: tuple[Need, ...], arrivals: Arrivals) -> Table:
         names = ", ".join(found.lacking or found.signals)
         table.add_row(need.name, state, rate, names)
     return table
-
-
-@contextlib.contextmanager
-def _ended() -> Iterator[Callable[[], bool]]:
-    """Announce Ctrl-C and a request to end, so that what was recorded is joined."""
-    asked = threading.Event()
-    if threading.current_thread() is not threading.main_thread():
-        yield asked.is_set
-        return
-    numbers = (signal.SIGINT, signal.SIGTERM)
-    before = [signal.signal(number, lambda *_: asked.set()) for number in numbers]
-    try:
-        yield asked.is_set
-    finally:
-        for number, handler in zip(numbers, before, strict=True):
-            signal.signal(number, handler)

@@ -6,7 +6,9 @@ import codecs
 import contextlib
 import io
 import os
+import signal
 import sys
+import threading
 from collections.abc import Iterable, Iterator
 from typing import IO, TYPE_CHECKING, Any, Final, TextIO, cast
 
@@ -187,3 +189,18 @@ def console(*, stderr: bool = False, **settings: Any) -> Console:
     stream = sys.stderr if stderr else sys.stdout
     below = stream.below if isinstance(stream, Terminal) else stream
     return SafeConsole(file=cast("IO[str]", Terminal(below, styled=True)), **settings)
+
+
+@contextlib.contextmanager
+def ended_by_signals(stop: threading.Event) -> Iterator[None]:
+    """Set an event where Ctrl-C or the system asks the process to end, until the block ends."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    numbers = (signal.SIGINT, signal.SIGTERM)
+    before = [signal.signal(number, lambda *_: stop.set()) for number in numbers]
+    try:
+        yield
+    finally:
+        for number, handler in zip(numbers, before, strict=True):
+            signal.signal(number, handler)
