@@ -283,3 +283,19 @@ def _opened(path: Path) -> IO[bytes]:
                 text.flush()
         return os.fdopen(os.dup(found[1]), "wb")
     return path.open("ab" if found is not None else "wb")
+
+
+def lock_file(number: int, *, wait: bool = False) -> bool:
+    """Lock an open file for this process; False where another one has it, unless it is waited for.
+
+    Where the system has no such locks nothing is locked.
+    """
+    try:
+        import fcntl
+    except ImportError:
+        return True
+    try:
+        fcntl.flock(number, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+    except OSError:
+        return False
+    return True

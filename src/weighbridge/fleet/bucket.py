@@ -22,10 +22,10 @@ from typing import Any, Final
 from weighbridge.errors import ConfigError
 from weighbridge.fleet.keys import file_digest, text_digest
 from weighbridge.fleet.remote import is_url, opened_store
-from weighbridge.fleet.store import MARK, PARTS, PROGRESS, is_results, lock_file
+from weighbridge.fleet.store import MARK, PARTS, PROGRESS, is_results
 from weighbridge.visible import visible
 from weighbridge.whole import PART as UNFINISHED
-from weighbridge.whole import write_whole
+from weighbridge.whole import lock_file, write_whole
 
 SENT: Final = "sent.json"
 """List of the files that a store has, with a name that each sending changes."""

@@ -6,7 +6,6 @@ import asyncio
 import concurrent.futures
 import contextlib
 import hashlib
-import os
 import queue
 import time
 import uuid
@@ -19,6 +18,7 @@ from weighbridge.errors import ConfigError, WeighbridgeError
 from weighbridge.fleet.job import THERE, TRIES, Job, Receipt, fail_job, weigh_job
 from weighbridge.fleet.schema import FAILED, UNREAD
 from weighbridge.messages import Problem
+from weighbridge.whole import lock_file
 
 if TYPE_CHECKING:
     from distributed import Client, Future
@@ -357,9 +357,5 @@ def _alone(path: Path) -> Iterator[None]:
         yield
         return
     with file:
-        if os.name != "nt":
-            import fcntl
-
-            with contextlib.suppress(OSError):
-                fcntl.flock(file.fileno(), fcntl.LOCK_EX)
+        lock_file(file.fileno(), wait=True)
         yield

@@ -51,7 +51,7 @@ from weighbridge.fleet.schema import (
     segments_of,
 )
 from weighbridge.whole import PART as UNFINISHED
-from weighbridge.whole import whole_file, write_whole
+from weighbridge.whole import lock_file, whole_file, write_whole
 
 MARK: Final = "fleet.json"
 PROGRESS: Final = "progress.json"
@@ -510,16 +510,3 @@ def _whole(path: Path) -> Iterator[None]:
             f"{path}: is damaged ({why}); remove {' and '.join(map(str, gone))}, and give the "
             "command of the run again, which weighs what is missing"
         ) from None
-
-
-def lock_file(number: int) -> bool:
-    """Lock an open file; False where another process has it."""
-    if os.name == "nt":
-        return True
-    import fcntl
-
-    try:
-        fcntl.flock(number, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        return False
-    return True

@@ -19,7 +19,7 @@ from weighbridge.live.source import Samples
 from weighbridge.live.sources.gathered import SLICE
 from weighbridge.live.sources.kind import SourceOptions, parted_rate
 from weighbridge.live.sources.links import BleLink, Link, SerialLink, tcp
-from weighbridge.live.sources.lock import DeviceLock
+from weighbridge.live.sources.lock import device_lock
 from weighbridge.live.sources.polling import Pace, Poller
 from weighbridge.live.sources.schedule import Request
 
@@ -221,7 +221,7 @@ class ElmSource:
     def run(self, put: Callable[[Samples], None], stop: Event) -> None:
         """Ask until asked to stop; see `weighbridge.live.source.Source.run`."""
         self.trouble = ""
-        with DeviceLock(self.name):
+        with device_lock(self.name):
             try:
                 carrier = self._found(stop)
                 if carrier is None:

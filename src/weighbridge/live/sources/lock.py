@@ -5,15 +5,17 @@ from __future__ import annotations
 import hashlib
 import os
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from types import TracebackType
-from typing import IO
 
 from weighbridge.errors import SourceError
+from weighbridge.whole import lock_file
 
 
-class DeviceLock:
-    """Held while a device is used, by one process of a user.
+@contextmanager
+def device_lock(source: str) -> Iterator[None]:
+    """Keep other processes of a user from a device while it is used.
 
     Parameters
     ----------
@@ -22,40 +24,17 @@ class DeviceLock:
     Raises
     ------
     SourceError
-        On entering: another process holds it.
+        Another process holds it.
     """
-
-    def __init__(self, source: str) -> None:
-        self._source = source
-        digest = hashlib.sha256(source.encode()).hexdigest()[:16]
-        user = getattr(os, "getuid", int)()
-        self._path = Path(tempfile.gettempdir()) / f"weighbridge-{user}-{digest}.lock"
-        self._file: IO[bytes] | None = None
-
-    def __enter__(self) -> DeviceLock:
-        try:
-            import fcntl
-        except ImportError:  # a system that opens ports for one process only
-            return self
-        file = None
-        try:
-            file = self._path.open("ab")
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            if file is not None:
-                file.close()
-            raise SourceError(
-                f"{self._source} is in use by another process; end that one first"
-            ) from None
-        self._file = file
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        if self._file is not None:
-            self._file.close()
-            self._file = None
+    digest = hashlib.sha256(source.encode()).hexdigest()[:16]
+    user = getattr(os, "getuid", int)()
+    path = Path(tempfile.gettempdir()) / f"weighbridge-{user}-{digest}.lock"
+    taken = SourceError(f"{source} is in use by another process; end that one first")
+    try:
+        file = path.open("ab")
+    except OSError:
+        raise taken from None
+    with file:
+        if not lock_file(file.fileno()):
+            raise taken
+        yield

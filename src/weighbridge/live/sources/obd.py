@@ -16,7 +16,7 @@ from weighbridge.io.obd import parameters_of
 from weighbridge.live.source import Samples
 from weighbridge.live.sources.canbus import BusPlace, receive
 from weighbridge.live.sources.kind import SourceOptions
-from weighbridge.live.sources.lock import DeviceLock
+from weighbridge.live.sources.lock import device_lock
 from weighbridge.live.sources.polling import Pace, Poller
 from weighbridge.live.sources.schedule import Request
 
@@ -60,7 +60,7 @@ class ObdSource:
     def run(self, put: Callable[[Samples], None], stop: Event) -> None:
         """Ask until asked to stop; see `weighbridge.live.source.Source.run`."""
         self.trouble = ""
-        with DeviceLock(self.name):
+        with device_lock(self.name):
             bus = self._bus.open(_ANSWERS)
             try:
                 carrier = CanCarrier(bus, self._bus, stop)

@@ -12,7 +12,7 @@ from weighbridge.live.clock import now
 from weighbridge.live.source import Samples
 from weighbridge.live.sources.gathered import BLOCK, SLICE, Gathered
 from weighbridge.live.sources.links import Link
-from weighbridge.live.sources.lock import DeviceLock
+from weighbridge.live.sources.lock import device_lock
 
 SILENT: Final = 5.0
 """A receiver that sends nothing with a fix for so long has a trouble [s]."""
@@ -63,7 +63,7 @@ class ReceiverSource:
     def run(self, put: Callable[[Samples], None], stop: Event) -> None:
         """Hand over fixes until asked to stop; see `weighbridge.live.source.Source.run`."""
         self.trouble = ""
-        with nullcontext() if self._shared else DeviceLock(self.name):
+        with nullcontext() if self._shared else device_lock(self.name):
             link = self._open()
             try:
                 self._listen(link, put, stop)
