@@ -164,8 +164,8 @@ def _summary(folder: Path) -> dict[str, Any]:
     """Count the rows of the results by what came of them."""
     import polars as pl
 
+    from weighbridge.fleet.legs import unjudged, with_causes
     from weighbridge.fleet.reading import collected, read_drives
-    from weighbridge.fleet.unjudged import unjudged, with_causes
 
     rows = read_drives(folder).select(
         "key", "outcome", "status", "reason_id", "reason", "mass_kg", "tare_kg", "gross_kg",

@@ -95,7 +95,7 @@ def say_unjudged(causes: pl.DataFrame, of: int, word: str) -> None:
 
     Parameters
     ----------
-    causes : as of `weighbridge.fleet.unjudged.unjudged`
+    causes : as of `weighbridge.fleet.legs.unjudged`
     of : rows in all
     word : what a row is
     """

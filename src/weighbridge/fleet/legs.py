@@ -1,22 +1,197 @@
-"""Legs: the spans of drives with one load each, and what was loaded between them."""
+"""Legs: the spans of drives with one load each, what was loaded between, what was not judged."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final, NamedTuple
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import polars as pl
 from scipy.special import stdtr, stdtrit
 
 from weighbridge.errors import ConfigError
-from weighbridge.fleet.couplings import Coupling, with_couplings
 from weighbridge.fleet.learnt import with_factors
 from weighbridge.fleet.schema import LEGS
+from weighbridge.fleet.tickets import POSSIBLE, instant_of, rows_of
 from weighbridge.fleet.trailers import SHOWN, with_trailers
-from weighbridge.fleet.unjudged import with_causes
 from weighbridge.messages import Problem
 from weighbridge.signals import Floats
+
+COUPLINGS: Final = ("vehicle", "start", "end", "permitted_kg")
+"""Columns of a table of couplings: id of the vehicle, when its trailer was coupled and uncoupled
+(UTC where no zone is named; an empty end is none yet), permitted mass of vehicle and trailer."""
+
+_TIME: Final = pl.Datetime("us", "UTC")
+_NEVER: Final = datetime(9999, 1, 1, tzinfo=UTC)
+
+
+class Coupling(NamedTuple):
+    """A trailer behind a vehicle: from when to when, permitted mass of both [kg]."""
+
+    vehicle: str
+    start: datetime
+    end: datetime
+    permitted: float
+
+
+def read_couplings(path: Path) -> list[Coupling]:
+    """Read a table of couplings, CSV or Parquet, see `COUPLINGS`.
+
+    Raises
+    ------
+    ConfigError
+        It cannot be read, lacks a column, or a row is impossible.
+    """
+    return [_coupling(cells, where) for where, cells in rows_of(path, COUPLINGS)]
+
+
+def _coupling(cells: tuple[Any, ...], where: str) -> Coupling:
+    vehicle, start, end, permitted = cells
+    try:
+        begun, ended = instant_of(start), _NEVER if end in (None, "") else instant_of(end)
+        mass = float(permitted)
+    except (TypeError, ValueError):
+        raise ConfigError(
+            f"{where}: start {start!r}, end {end!r} and permitted_kg {permitted!r} must be dates "
+            "and times such as 2026-05-01T06:30:00Z and kilograms"
+        ) from None
+    if not begun < ended:
+        raise ConfigError(f"{where}: end {end!r} is not after start {start!r}")
+    if vehicle is None or not POSSIBLE[0] <= mass <= POSSIBLE[1]:
+        raise ConfigError(f"{where}: vehicle {vehicle!r} with {mass:g} kg is no permitted mass")
+    return Coupling(str(vehicle), begun, ended, mass)
+
+
+def with_couplings(legs: pl.DataFrame, couplings: Sequence[Coupling]) -> pl.DataFrame:
+    """Add the permitted mass of each leg, and whether a trailer was coupled at its middle.
+
+    A trailer that the vehicle reports is coupled, too. Without a row of the table nobody knows what
+    both may have.
+
+    Parameters
+    ----------
+    legs : with the columns ``vehicle_id``, ``start``, ``end`` [UTC], ``gross_kg`` and
+        ``trailer_connected``
+    couplings : of a vehicle, the one that began last counts
+
+    Returns
+    -------
+    The legs, in their order, with ``permitted_kg`` and ``coupled``
+    """
+    known = pl.DataFrame(
+        couplings,
+        schema={
+            "vehicle_id": pl.String,
+            "_start": _TIME,
+            "_end": _TIME,
+            "_permitted": pl.Float64,
+        },
+        orient="row",
+    ).sort("_start")
+    reported = pl.col("trailer_connected").fill_null(value=False)
+    middle = pl.col("start") + (pl.col("end") - pl.col("start")) / 2
+    rows = legs.with_row_index("_row").with_columns(_middle=middle)
+    found = (
+        rows.drop_nulls(["_middle", "vehicle_id"])
+        .select("_row", "vehicle_id", "_middle")
+        .sort("_middle")
+        .join_asof(
+            known, left_on="_middle", right_on="_start", by="vehicle_id", check_sortedness=False
+        )
+        .filter(pl.col("_middle") < pl.col("_end"))
+        .select("_row", "_permitted")
+    )
+    return (
+        rows.join(found, on="_row", how="left", maintain_order="left")
+        .with_columns(
+            permitted_kg=pl.when(reported & pl.col("_permitted").is_null())
+            .then(None)
+            .otherwise(pl.coalesce("_permitted", "gross_kg")),
+            coupled=pl.col("_permitted").is_not_null() | reported,
+        )
+        .drop("_row", "_middle", "_permitted")
+    )
+
+
+PREVENTED: Final = ("mass", "overload", "payload")
+"""What may not be known of a leg, the worst first: each also prevents those behind it."""
+
+
+def with_causes(rows: pl.DataFrame, permitted: str) -> pl.DataFrame:
+    """Add what is not known of each row first of `PREVENTED`, and why.
+
+    Parameters
+    ----------
+    rows : with ``mass_kg``, ``tare_kg``, ``gross_kg``, ``vehicle_file``, ``reason`` and
+        ``reason_id``
+    permitted : column of the permitted mass
+
+    Returns
+    -------
+    polars.DataFrame
+        The rows with ``prevents``, ``reason_id`` and ``reason``; null where all is known.
+    """
+    lacks = (
+        ("mass", pl.col("mass_kg").is_null(), None),
+        (
+            "overload",
+            pl.col(permitted).is_null() & pl.col("vehicle_file").is_null(),
+            Problem.of("fleet.no_file"),
+        ),
+        (
+            "overload",
+            pl.col(permitted).is_null() & pl.col("gross_kg").is_not_null(),
+            Problem.of("fleet.trailer_reported"),
+        ),
+        ("overload", pl.col(permitted).is_null(), Problem.of("fleet.no_permitted")),
+        ("payload", pl.col("tare_kg").is_null(), Problem.of("fleet.no_tare")),
+    )
+    found = {name: pl.lit(None, pl.String) for name in ("prevents", "reason_id", "reason")}
+    for what, lacking, problem in reversed(lacks):
+        reported = {
+            "prevents": pl.lit(what),
+            "reason_id": pl.col("reason_id") if problem is None else pl.lit(problem.id),
+            "reason": pl.col("reason") if problem is None else pl.lit(problem.text),
+        }
+        found = {n: pl.when(lacking).then(reported[n]).otherwise(found[n]) for n in found}
+    return rows.with_columns(**found)
+
+
+def unjudged(rows: pl.DataFrame) -> pl.DataFrame:
+    """Return the causes for which legs or drives were not judged, ranked.
+
+    Parameters
+    ----------
+    rows : as of `with_causes`, with ``vehicle_id`` and ``distance_km``
+
+    Returns
+    -------
+    polars.DataFrame
+        ``prevents`` (in the order of `PREVENTED`), ``reason_id``, ``example`` (a sentence),
+        ``count`` (of rows; most frequent first), ``share`` (of all rows), ``distance_km``,
+        ``vehicles`` (their ids).
+    """
+    rank = {name: number for number, name in enumerate(PREVENTED)}
+    return (
+        rows.filter(pl.col("prevents").is_not_null())
+        .group_by("prevents", "reason_id")
+        .agg(
+            pl.col("reason").sort().first().alias("example"),
+            pl.len().cast(pl.Int64).alias("count"),
+            (pl.len() / max(rows.height, 1)).alias("share"),
+            pl.col("distance_km").sum(),
+            pl.col("vehicle_id").unique().sort().alias("vehicles"),
+        )
+        .sort(
+            pl.col("prevents").replace_strict(rank, return_dtype=pl.Int32),
+            "count",
+            "reason_id",
+            descending=[False, True, False],
+        )
+    )
+
 
 SURE: Final = 1.959964
 """Standard deviations of a change of load that is reported: 95 % of a normal distribution."""

@@ -7,9 +7,18 @@ from pathlib import Path
 import polars as pl
 
 from weighbridge.arguments import check_path
-from weighbridge.fleet.places import HEAD, counted, standing
 from weighbridge.fleet.schema import DRIVES, SEGMENTS
-from weighbridge.fleet.store import TABLES, Results, check_end, read_found, read_parts, timed
+from weighbridge.fleet.store import (
+    HEAD,
+    TABLES,
+    Results,
+    check_end,
+    counted,
+    read_found,
+    read_parts,
+    standing,
+    timed,
+)
 
 
 def read_drives(results: str | Path) -> pl.LazyFrame:

@@ -11,12 +11,10 @@ import polars as pl
 
 from weighbridge.errors import ConfigError
 from weighbridge.fleet import figures, protocol
-from weighbridge.fleet.couplings import read_couplings
 from weighbridge.fleet.learnt import read_learnt, with_factors
-from weighbridge.fleet.legs import Limits, legs, load_changes
+from weighbridge.fleet.legs import Limits, legs, load_changes, read_couplings, unjudged
 from weighbridge.fleet.reading import collected, read_drives, read_segments
 from weighbridge.fleet.tickets import read_tickets
-from weighbridge.fleet.unjudged import unjudged
 from weighbridge.visible import visible_json
 from weighbridge.whole import write_whole
 
@@ -105,7 +103,7 @@ class FleetReport:
     track : spans with one load, see `weighbridge.fleet.reporting.track`
     vehicles : one row each, see `weighbridge.fleet.figures.per_vehicle`
     totals : sums, see `weighbridge.fleet.figures.totals`
-    unjudged : why legs were not judged, see `weighbridge.fleet.unjudged.unjudged`
+    unjudged : why legs were not judged, see `weighbridge.fleet.legs.unjudged`
     quality : what is wrong with the data, see `weighbridge.fleet.figures.quality`
     speed_mass : distance by speed and mass, see `weighbridge.fleet.figures.speed_mass`
     outside : known masses outside their intervals, see `weighbridge.fleet.protocol.outside`
@@ -201,7 +199,7 @@ def report(
     results : folder that ``weighbridge fleet`` wrote
     limits : of overload, trailer and empty
     tickets : table of known masses, see `weighbridge.fleet.tickets.read_tickets`
-    couplings : table of trailers, see `weighbridge.fleet.couplings.read_couplings`
+    couplings : table of trailers, see `weighbridge.fleet.legs.read_couplings`
     tolerance : largest error that passes the protocol [-]
 
     Raises

@@ -10,7 +10,7 @@ import numpy as np
 
 from weighbridge.estimators import tilt
 from weighbridge.estimators.tilt import Learnt, Stand, TiltChange, TiltMap
-from weighbridge.live.questions import PROVED
+from weighbridge.live.outlook import PROVED
 from weighbridge.live.weighing import KerbState
 from weighbridge.signals import Drive, Floats
 

@@ -22,8 +22,15 @@ from weighbridge.live.kerb import Kerb, Weighed, stands
 from weighbridge.live.learning import LONGEST, Learned, known_mass
 from weighbridge.live.looking import Look, Step
 from weighbridge.live.on_the_move import FIRST, OnTheMove, moves
-from weighbridge.live.outlook import NO_STOP, Outlook, UnfollowedStop, outlook
-from weighbridge.live.questions import by_tilt, doubts, of_before
+from weighbridge.live.outlook import (
+    NO_STOP,
+    Outlook,
+    UnfollowedStop,
+    by_tilt,
+    doubts,
+    of_before,
+    outlook,
+)
 from weighbridge.live.records import LATENESS, Records
 from weighbridge.live.source import Samples
 from weighbridge.live.weighing import LiveStatus, LiveWeighing, SignalHealth
