@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final, NamedTuple
 
 import typer
 
@@ -301,63 +301,19 @@ def table(done: Calibration) -> Table:
     return shown
 
 
-@dataclass(frozen=True)
-class OwnMasses:
+class OwnMasses(NamedTuple):
     """What the drives of a calibration weigh by its file.
 
     Attributes
     ----------
     lines : what each drive weighs, and what `weigh` would note of it
-    unweighed : drives that have no mass, with the reason, in their order
-    drives : how many were weighed or not
-    outside : drives whose known mass lies outside the interval, with what it weighs, in their order
+    doubt : what is to be said of the file; None where it weighs all of its drives as they are known
+    useless : whether it weighs none of them
     """
 
-    lines: tuple[str, ...]
-    unweighed: tuple[tuple[str, str], ...]
-    drives: int
-    outside: tuple[tuple[str, str], ...] = ()
-
-    @property
-    def useless(self) -> bool:
-        """Whether the file weighs none of the drives it was made from."""
-        return len(self.unweighed) == self.drives
-
-    @property
-    def doubt(self) -> Problem | None:
-        """What is to be said of the file; None where it weighs all of its drives."""
-        from weighbridge.messages import Problem
-
-        if not self.unweighed:
-            return self._contradiction
-        name, reason = self.unweighed[0]
-        about: dict[str, Any] = {"drive": name, "reason": reason}
-        if not self.useless:
-            return Problem.of(
-                "calibration.some_unweighed",
-                **about,
-                count=len(self.unweighed),
-                drives=self.drives,
-            )
-        alone = self.drives == 1
-        which = "calibration.own_unweighed" if alone else "calibration.all_unweighed"
-        return Problem.of(which, **about)
-
-    @property
-    def _contradiction(self) -> Problem | None:
-        """What speaks against a known mass; None where all lie within their intervals."""
-        from weighbridge.messages import Problem
-
-        if not self.outside:
-            return None
-        name, words = self.outside[0]
-        return Problem.of(
-            "calibration.outside",
-            count=len(self.outside),
-            drives=self.drives,
-            drive=name,
-            words=words,
-        )
+    lines: list[str]
+    doubt: Problem | None
+    useless: bool
 
 
 def own_masses(
@@ -372,6 +328,7 @@ def own_masses(
     progress : reported of drives weighed of all
     """
     from weighbridge.errors import WeighbridgeError
+    from weighbridge.messages import Problem
     from weighbridge.pipeline.weighing import DEFAULT_METHOD, weigh
 
     made = car.provenance
@@ -398,7 +355,19 @@ def own_masses(
             lines.append(f"  {drive.name}: no mass ({own.status}): {own.reason}")
             unweighed.append((drive.name, own.reason))
         lines += [f"    note: {p.text}" for p in own.problems if p.line not in made.doubts]
-    return OwnMasses(tuple(lines), tuple(unweighed), len(drives), tuple(outside))
+    useless, doubt = len(unweighed) == len(drives), None
+    if found := unweighed or outside:
+        about: dict[str, Any] = {
+            "drive": found[0][0],
+            "reason" if unweighed else "words": found[0][1],
+        }
+        if useless:
+            which = "calibration.own_unweighed" if len(drives) == 1 else "calibration.all_unweighed"
+        else:
+            which = "calibration.some_unweighed" if unweighed else "calibration.outside"
+            about |= {"count": len(found), "drives": len(drives)}
+        doubt = Problem.of(which, **about)
+    return OwnMasses(lines, doubt, useless)
 
 
 def _words(own: Weighing, known: float) -> str:
