@@ -6,7 +6,7 @@ import os
 import pkgutil
 import platform
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from importlib import import_module, metadata
 from pathlib import Path
 from types import ModuleType
@@ -101,12 +101,12 @@ class KernelCache:
     why : kernels are not kept, in a sentence; empty where they are
     """
 
-    folder: Path | None
-    writable: bool
-    size: int
-    compiled: int
-    kernels: int
-    why: str
+    folder: Path | None = None
+    writable: bool = False
+    size: int = 0
+    compiled: int = 0
+    kernels: int = 0
+    why: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -202,7 +202,7 @@ def examine() -> Installation:
             for name, purpose in EXTRAS.items()
             if name in wanted
         ),
-        cache=_cache() if all(package.fits for package in needed) else _unknown(),
+        cache=_cache() if all(package.fits for package in needed) else KernelCache(),
     )
 
 
@@ -253,16 +253,7 @@ def _found(wanted: Requirement) -> Package:
 
 
 def _row(package: Package) -> dict[str, Any]:
-    return {
-        "name": package.name,
-        "wanted": package.wanted,
-        "installed": package.installed,
-        "fits": package.fits,
-    }
-
-
-def _unknown() -> KernelCache:
-    return KernelCache(None, False, 0, 0, 0, "")
+    return {**asdict(package), "fits": package.fits}
 
 
 def _cache() -> KernelCache:
@@ -273,19 +264,13 @@ def _cache() -> KernelCache:
     modules = [import_module(f"{kernels.__name__}.{name}") for name in sorted(names)]
     caches = [kernel._cache for module in modules for kernel in _kernels(module)]
     if not caches:
-        return KernelCache(
-            None, False, 0, 0, 0, "kernels are not compiled at all: unset NUMBA_DISABLE_JIT"
-        )
+        return KernelCache(why="kernels are not compiled at all: unset NUMBA_DISABLE_JIT")
     kept = [cache for cache in caches if getattr(cache, "cache_path", None)]
     if not kept:
         return KernelCache(
-            None,
-            False,
-            0,
-            0,
-            len(caches),
-            "compiled kernels are not kept, so that each run compiles: name a folder that can be "
-            "written to in NUMBA_CACHE_DIR",
+            kernels=len(caches),
+            why="compiled kernels are not kept, so that each run compiles: name a folder that can "
+            "be written to in NUMBA_CACHE_DIR",
         )
     folder = Path(kept[0].cache_path)
     files = [file for pattern in ("*.nbi", "*.nbc") for file in folder.glob(pattern)]

@@ -49,15 +49,15 @@ class Learned:
     """
 
     until: float
-    since: float
-    setup: ForwardSetup | None
-    state: ForwardState | None
-    mass: float
-    std: float
-    floor: float
-    inconsistent: bool
-    refusal: Problem | None
-    problems: tuple[Problem, ...]
+    since: float = math.nan
+    setup: ForwardSetup | None = None
+    state: ForwardState | None = None
+    mass: float = math.nan
+    std: float = math.nan
+    floor: float = 0.0
+    inconsistent: bool = False
+    refusal: Problem | None = None
+    problems: tuple[Problem, ...] = ()
     early: Problem | None = None
     std_found: float = math.inf
 
@@ -103,15 +103,15 @@ def learn(drive: Drive, vehicle: Vehicle, until: float, step: float) -> Learned:
     try:
         weighing = weigh(drive, vehicle)
     except WeighbridgeError as error:
-        return _nothing(until, Problem.from_error(error), inconsistent=True)
+        return Learned(until=until, refusal=Problem.from_error(error), inconsistent=True)
     early = weighing.refusal if weighing.status is Status.NOT_EXCITED else None
     if early is not None:
         weighing = _early(drive, vehicle)
     inconsistent = weighing.status is Status.INCONSISTENT and early is None
     if weighing.result is None or not math.isfinite(weighing.mass):
-        return _nothing(
-            until,
-            early or weighing.refusal,
+        return Learned(
+            until=until,
+            refusal=early or weighing.refusal,
             inconsistent=inconsistent,
             problems=weighing.problems,
             std_found=_std_found(weighing),
@@ -125,8 +125,6 @@ def learn(drive: Drive, vehicle: Vehicle, until: float, step: float) -> Learned:
         mass=weighing.mass,
         std=weighing.std,
         floor=_floor(weighing),
-        inconsistent=False,
-        refusal=None,
         early=early,
         problems=weighing.problems,
         std_found=_std_found(weighing),
@@ -167,22 +165,3 @@ def _std_found(weighing: Weighing) -> float:
     if result is None or not result.mass > 0.0:
         return math.inf
     return result.std / result.mass
-
-
-def _nothing(
-    until: float, refusal: Problem | None, *, inconsistent: bool,
-    problems: tuple[Problem, ...] = (), std_found: float = math.inf,
-) -> Learned:  # fmt: skip
-    return Learned(
-        until=until,
-        since=math.nan,
-        setup=None,
-        state=None,
-        mass=math.nan,
-        std=math.nan,
-        floor=0.0,
-        inconsistent=inconsistent,
-        refusal=refusal,
-        problems=problems,
-        std_found=std_found,
-    )
