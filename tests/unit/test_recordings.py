@@ -39,7 +39,7 @@ def instants(folder, name="accel_x"):
 
 def test_a_new_drive_begins_where_one_is_large_and_no_sample_is_lost(tmp_path):
     clock = Clock()
-    with Recordings(tmp_path / "trip", split_mb=0.03, clock=clock) as recordings:
+    with Recordings(tmp_path / "trip", split=30e3, clock=clock) as recordings:
         fed(recordings, clock, SECONDS)
     folders = recordings.folders
     assert len(folders) > 3
@@ -62,7 +62,7 @@ from weighbridge.live import Recordings
 from tests.unit.test_recorder import Clock
 from tests.unit.test_recordings import fed
 clock = Clock()
-recordings = Recordings(Path(sys.argv[1]), split_mb=0.03, clock=clock)
+recordings = Recordings(Path(sys.argv[1]), split=30e3, clock=clock)
 fed(recordings, clock, 200)
 os.kill(os.getpid(), signal.SIGKILL)
 """
@@ -109,7 +109,9 @@ def old(tmp_path):
 
 def test_old_drives_of_the_series_go_and_nothing_else(tmp_path, old):
     clock = Clock()
-    with Recordings(tmp_path / "trip", keep_days=30.0, clock=clock, date=lambda: old) as recordings:
+    with Recordings(
+        tmp_path / "trip", keep=30.0 * DAY, clock=clock, date=lambda: old
+    ) as recordings:
         fed(recordings, clock, 2, 100)
         # trip-3 holds something of its owner.
         rest = ["other", "trip-3", "trip-4", "trip-5", "trip-x", "trips"]
@@ -126,7 +128,7 @@ def test_nothing_goes_unless_it_is_asked_for_or_where_no_clock_was_set(tmp_path,
     with Recordings(tmp_path / "trip", date=lambda: old):
         pass
     assert named(tmp_path) == before
-    keep = partial(Recordings, tmp_path / "trip", keep_days=30.0)
+    keep = partial(Recordings, tmp_path / "trip", keep=30.0 * DAY)
     with keep(date=lambda: 1000.0):
         pass
     assert named(tmp_path) == before

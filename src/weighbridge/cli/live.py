@@ -274,9 +274,9 @@ def _free_file(vehicle: Path) -> Path:
 
 def _recorder(folder: Path, info: DriveInfo, split: float | None, keep: float | None) -> Recordings:
     """Record into a folder, or beside it where it holds a drive: a service starts again."""
-    from weighbridge.live import Recordings
+    from weighbridge.live.recordings import recordings
 
-    made = Recordings(folder, info, split_mb=split, keep_days=keep)
+    made = recordings(folder, info, split_mb=split, keep_days=keep)
     if made.folders != [folder]:
         complain(f"{folder} holds something and stays as it is: recorded into {made.folders[0]}")
     return made

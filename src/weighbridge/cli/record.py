@@ -58,7 +58,8 @@ def record(
 
     Example: weighbridge record --source elm:/dev/ttyUSB0 --source gpsd:localhost:2947 -o drive/
     """
-    from weighbridge.live import Feed, Recorder, Recordings, needs, parse_source
+    from weighbridge.live import Feed, Recorder, needs, parse_source
+    from weighbridge.live.recordings import recordings
     from weighbridge.signals import DriveInfo
     from weighbridge.vehicle import Vehicle
 
@@ -72,7 +73,7 @@ def record(
     if split_mb is None and keep_days is None:
         recorder = Recorder(output, info)
     else:
-        recorder = Recordings(output, info, split_mb=split_mb, keep_days=keep_days)
+        recorder = recordings(output, info, split_mb=split_mb, keep_days=keep_days)
     with recorder, Feed(sources) as feed:
         look(feed, needs(car), check)
         until = monotonic() + duration if duration is not None else float("inf")

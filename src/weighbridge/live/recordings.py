@@ -39,9 +39,9 @@ class Recordings:
     ----------
     folder : of the first drive; one that holds something stays, see `free_folder`
     info : of each drive, see `Recorder`
-    split_mb : a new drive begins where the parts of one have so many megabytes; None for never
-    keep_days : drives whose newest file is so many days old are removed; None for none. Only
-        folders of this series, which hold nothing but what a recorder wrote
+    split : a new drive begins where the parts of one have so many bytes; infinite for never
+    keep : drives whose newest file is so old are removed [s]; infinite for none. Only folders of
+        this series, which hold nothing but what a recorder wrote
     clock : for parts, and for how often old drives are looked for [s]
     date : seconds since 1970, as files have it
 
@@ -60,15 +60,14 @@ class Recordings:
         folder: Path,
         info: DriveInfo | None = None,
         *,
-        split_mb: float | None = None,
-        keep_days: float | None = None,
+        split: float = math.inf,
+        keep: float = math.inf,
         clock: Callable[[], float] = time.monotonic,
         date: Callable[[], float] = time.time,
     ) -> None:
         self._first = folder
         self._info = info
-        self._split = math.inf if split_mb is None else split_mb * 1e6
-        self._keep = math.inf if keep_days is None else keep_days * 86_400.0
+        self._split, self._keep = split, keep
         self._clock, self._date = clock, date
         self._recorder = Recorder(free_folder(folder), info, clock=clock)
         self.folders = [self._recorder.folder]
@@ -131,6 +130,25 @@ class Recordings:
                     _logger.warning("%s cannot be removed: %s", folder, error.strerror or error)
                 else:
                     _logger.warning("%s is older than is to be kept: removed", folder)
+
+
+def recordings(
+    folder: Path, info: DriveInfo, *, split_mb: float | None, keep_days: float | None
+) -> Recordings:
+    """Record in a series, as a person says it.
+
+    Parameters
+    ----------
+    folder, info : see `Recordings`
+    split_mb : a new drive begins where one has so many megabytes; None for never
+    keep_days : drives are removed after so many days; None for never
+    """
+    return Recordings(
+        folder,
+        info,
+        split=math.inf if split_mb is None else split_mb * 1e6,
+        keep=math.inf if keep_days is None else keep_days * 86_400.0,
+    )
 
 
 def series(folder: Path) -> list[Path]:
