@@ -63,7 +63,7 @@ def test_a_signal_that_no_drive_can_hold_is_refused(install, log):
 @pytest.mark.parametrize(
     ("module", "name", "said"),
     [
-        (READER, "read", "is no weighbridge.io.formats.Format"),
+        (READER, "read", "is no weighbridge.io.format.Format"),
         ("raise RuntimeError('too old')", "FORMAT", "cannot be loaded (RuntimeError: too old)"),
     ],
 )

@@ -10,9 +10,9 @@ if TYPE_CHECKING:
     from weighbridge.io.bus_draft import draft_bus as draft_bus
     from weighbridge.io.dbc import load_dbcs as load_dbcs
     from weighbridge.io.draft import Draft as Draft
+    from weighbridge.io.format import Format as Format
+    from weighbridge.io.format import Takes as Takes
     from weighbridge.io.formats import FORMATS as FORMATS
-    from weighbridge.io.formats import Format as Format
-    from weighbridge.io.formats import Takes as Takes
     from weighbridge.io.formats import all_formats as all_formats
     from weighbridge.io.formats import draft_table as draft_table
     from weighbridge.io.formats import format_of as format_of
@@ -46,7 +46,8 @@ __getattr__, __dir__, __all__ = at_first_uses(
         "bus_draft": "draft_bus",
         "dbc": "load_dbcs",
         "draft": "Draft",
-        "formats": "FORMATS Format Takes all_formats draft_table format_of is_log",
+        "format": "Format Takes",
+        "formats": "FORMATS all_formats draft_table format_of is_log",
         "isotp": "join_messages",
         "mapping": "load_mapping",
         "mapping_toml": "mapping_text",

@@ -17,7 +17,8 @@ from weighbridge.io import tabular
 from weighbridge.io.clocks import settle_clocks, shift_clock
 from weighbridge.io.dbc import Database, DbcSource, load_dbcs
 from weighbridge.io.filled_positions import true_fixes
-from weighbridge.io.formats import Format, Takes, format_of, is_log, suffixes, unreadable
+from weighbridge.io.format import Format, Takes
+from weighbridge.io.formats import format_of, is_log, suffixes, unreadable
 from weighbridge.io.frames import Frames, join_frames, settle_clock
 from weighbridge.io.info import FILE_NAME as INFO_NAME
 from weighbridge.io.info import read_info
