@@ -20,11 +20,11 @@ def weighing(mass, std=50.0, status=LiveStatus.WEIGHED):
 def test_an_alert_begins_once_and_ends_once():
     alert = Alert(3500.0)
     masses = [3400.0, 3560.0, 3600.0, 3570.0, 3520.0, 3590.0, 3480.0, 3400.0]
-    events = [(m, text) for m in masses if (text := alert.look(weighing(m)))]
-    assert [m for m, _ in events] == [3600.0, 3480.0]
+    events = [(m, e) for m in masses if (e := alert.look(weighing(m))) is not None]
+    assert [(m, e.on) for m, e in events] == [(3600.0, True), (3480.0, False)]
     # Two standard deviations above.
-    assert events[0][1] == "above 3500 kg: 3600 kg, with probability 0.98"
-    assert events[1][1].startswith("no longer above 3500 kg: 3480 kg")
+    assert events[0][1].probability == pytest.approx(0.9772, abs=1e-4)
+    assert "above 3500 kg" in events[0][1].text
 
 
 def test_the_interval_is_that_of_the_normal_distribution():
@@ -36,8 +36,8 @@ def test_the_interval_is_that_of_the_normal_distribution():
 
 def test_below_is_the_other_side():
     alert = Alert(2500.0, above=False)
-    assert not alert.look(weighing(2450.0))
-    assert alert.look(weighing(2400.0)).startswith("below 2500 kg")
+    assert alert.look(weighing(2450.0)) is None
+    assert alert.look(weighing(2400.0)).on
     assert alert.text == "below 2500 kg"
 
 
@@ -55,12 +55,12 @@ def test_its_state_goes_on_between_events():
 @pytest.mark.parametrize("status", [LiveStatus.LEARNING, LiveStatus.INCONSISTENT])
 def test_a_mass_that_is_not_weighed_alerts_nobody(status):
     alert = Alert(3500.0)
-    assert not alert.look(weighing(9000.0, status=status))
-    assert not alert.look(weighing(np.nan, np.nan))
+    assert alert.look(weighing(9000.0, status=status)) is None
+    assert alert.look(weighing(np.nan, np.nan)) is None
     assert not alert.active
 
 
-@pytest.mark.parametrize("limit", [0.0, np.nan])
-def test_what_cannot_be_is_refused(limit):
+@pytest.mark.parametrize("wrong", [{"limit": 0.0}, {"limit": 1.0, "on": 0.4}, {"limit": np.nan}])
+def test_what_cannot_be_is_refused(wrong):
     with pytest.raises(ConfigError):
-        Alert(limit)
+        Alert(**wrong)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Final
 
 from weighbridge.errors import ConfigError
@@ -14,6 +15,22 @@ OFF: Final = 0.5
 """and ends when it is less probable than that [-]: in between it stays as it is."""
 
 
+@dataclass(frozen=True, slots=True)
+class Event:
+    """An alert that began or ended.
+
+    Attributes
+    ----------
+    text : one sentence
+    on : it began
+    probability : of its case [-]
+    """
+
+    text: str
+    on: bool
+    probability: float
+
+
 class Alert:
     """Watches one limit.
 
@@ -21,18 +38,24 @@ class Alert:
     ----------
     limit : [kg]
     above : whether the case is a mass above the limit, else one below
+    on, off : probabilities at which it begins and ends [-]
 
     Raises
     ------
     ConfigError
-        The limit is no mass.
+        The limit is no mass, or the probabilities are not in order.
     """
 
-    def __init__(self, limit: float, *, above: bool = True) -> None:
+    def __init__(
+        self, limit: float, *, above: bool = True, on: float = ON, off: float = OFF
+    ) -> None:
         if not 0.0 < limit < 1e6:
             raise ConfigError(f"a limit of {limit:g} kg is no mass of a vehicle")
+        if not 0.0 < off <= on < 1.0:
+            raise ConfigError(f"an alert that begins at {on:g} and ends at {off:g} never rests")
         self.limit, self.above = limit, above
         self.active = False
+        self._on, self._off = on, off
 
     @property
     def side(self) -> Side:
@@ -57,19 +80,22 @@ class Alert:
         probability = weighing.above(self.limit)
         return probability if self.above or probability is None else 1.0 - probability
 
-    def look(self, weighing: LiveWeighing) -> str:
-        """Say in a sentence that a weighing begins or ends it; empty where nothing changes.
+    def look(self, weighing: LiveWeighing) -> Event | None:
+        """Return the event that a weighing makes; None where nothing changes.
 
         A mass that is withdrawn or not yet within 5 % changes nothing.
         """
+        if weighing.status is not LiveStatus.WEIGHED:
+            return None
         case = self._probability(weighing)
-        if weighing.status is not LiveStatus.WEIGHED or case is None:
-            return ""
-        wanted = case >= (OFF if self.active else ON)
+        if case is None:
+            return None
+        wanted = case >= (self._off if self.active else self._on)
         if wanted == self.active:
-            return ""
+            return None
         self.active = wanted
-        return (
+        text = (
             f"{'' if wanted else 'no longer '}{self.text}: "
             f"{weighing.mass:.0f} kg, with probability {case:.2f}"
         )
+        return Event(text, wanted, case)

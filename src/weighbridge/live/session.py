@@ -115,7 +115,7 @@ class Session:
             settled = self.scale.weighing(silence)
         for alert in self.alerts:
             if event := alert.look(settled):
-                _LOG.warning("%s", event)
+                _LOG.warning("%s", event.text)
         active = [Problem.of("live.alert", alert=a.text) for a in self.alerts if a.active]
         states = tuple(alert.state(settled) for alert in self.alerts)
         lost = [
