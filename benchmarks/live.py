@@ -21,8 +21,8 @@ from typing import NamedTuple
 import numpy as np
 
 import weighbridge as wb
-from weighbridge.live.replay import BLOCK, FASTEST_BLOCK, FASTEST_STEP
-from weighbridge.signals import Drive
+from weighbridge.live.replay import BLOCK, FASTEST_BLOCK
+from weighbridge.signals import LONGEST_STEP, Drive
 from weighbridge.simulation import make_scenario, simulate_car
 
 OPENPILOT = 25.0 + 9.0 + 5.0
@@ -48,7 +48,7 @@ def blocks(drive: Drive, length: float, shift: float = 0.0):
 
 def replayed(car: wb.Vehicle, drive: Drive) -> None:
     """Feed a drive as ``weighbridge live --replay`` does as fast as it goes, shown each second."""
-    scale = wb.LiveScale(car, info=drive.info, step=FASTEST_STEP)
+    scale = wb.LiveScale(car, info=drive.info, step=LONGEST_STEP)
     parts = list(blocks(drive, FASTEST_BLOCK))
     begin, wall = time.process_time(), time.perf_counter()
     for samples in parts:

@@ -19,7 +19,6 @@ from weighbridge.kernels.ins_model import (
     SCALE,
     SHOWN,
     STATES,
-    STDS,
     TIME,
     Z_SPEED,
     Z_SPEED_VAR,
@@ -55,7 +54,7 @@ def kernel_rate(samples: int = 400_000) -> float:
     z[:, Z_SPEED] = 20.0
     z[:, Z_SPEED_VAR] = 0.25
     block = Samples(stamps, accel, gyro, np.arange(samples), z)
-    states, stds = np.empty((samples, SHOWN)), np.empty((samples, STDS))
+    states, stds = np.empty((samples, SHOWN)), np.empty(samples)
     noise = NavigationSettings().noise()
 
     def go() -> None:
