@@ -226,9 +226,10 @@ def test_without_an_inertial_sensor_sound_clocks_are_left_to_the_last_bit(made):
         assert_array_equal(mended.signals[name].time, signal.time)
 
 
-def test_gnss_that_hardly_shows_its_clock_is_moved_by_all_of_the_drive(made):
+@pytest.mark.parametrize("length", [LENGTH, 400.0])
+def test_gnss_that_hardly_shows_its_clock_is_moved_by_all_of_the_drive(made, length):
     # Speed over ground as noisy as that between fixes: no piece shows the lag alone.
-    bare = without_imu(made.drive)
+    bare = without_imu(made.drive).between(0.0, length)
     ground = bare.signals["gnss_speed"]
     noise = np.random.default_rng(3).normal(0.0, 1.2, len(ground))
     noisy = bare.with_signals(replace(ground, values=np.abs(ground.values + noise)))

@@ -7,7 +7,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from weighbridge.limits import CERTAIN, DRIVES, FEWEST_BLOCKS, MANY
-from weighbridge.signals import Bools, Drive, Floats, parabola, robust_fits
+from weighbridge.signals import Bools, Drive, Floats, lowest, robust_fits
 
 READINGS: Final = ("engine_torque", "engine_torque_fraction", "engine_load")
 """What goes with the torque; the first that was recorded is taken."""
@@ -25,7 +25,7 @@ BLOCK: Final = 60.0
 """Blocks that are left out one after another for how sure the lag is [s]."""
 
 LEAST: Final = 1.5
-"""Smaller lags are left [s]: they are worth 2 % of the mass at most, in hills."""
+"""Smaller lags are left [s]: in hills 1 s was worth 2 % of the mass at most."""
 
 GAIN: Final = 0.1
 """Part of what is left unexplained that the lag explains at least [-]: 0.097 at most in 224
@@ -112,14 +112,6 @@ def find_height_lag(
         gain = 1.0 - float(total.min()) / max(usual, 1e-300)
         if gain <= GAIN or int(np.argmin(total)) not in (0, lags.size - 1):
             break
-    others = np.array([_lowest(lags, total - by_block[:, k]) for k in range(blocks)])
+    others = np.array([lowest(lags, total - by_block[:, k])[0] for k in range(blocks)])
     std = float(np.sqrt((blocks - 1) / blocks * np.sum((others - others.mean()) ** 2)))
-    return HeightLag(_lowest(lags, total), std, gain)
-
-
-def _lowest(lags: Floats, left: Floats) -> float:
-    best = int(np.argmin(left))
-    if best in (0, lags.size - 1):
-        return float(lags[best])
-    near = slice(best - 1, best + 2)
-    return parabola(lags[near], left[near]).at
+    return HeightLag(lowest(lags, total)[0], std, gain)

@@ -26,8 +26,8 @@ def speed_motion(drive: Drive, *, rate: float = 10.0) -> Motion:
 
     Grade comes from a grade signal, else from height over distance, else the
     road is taken as level and the notes say so. It is moved where the torque surely shows the
-    hills at another time. Acceleration and grade are
-    conditional means, see `weighbridge.navigation.smoothing`.
+    hills at another time. Acceleration and grade are conditional means, see
+    `weighbridge.navigation.smoothing`.
 
     Parameters
     ----------
