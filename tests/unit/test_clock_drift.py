@@ -226,16 +226,22 @@ def test_without_an_inertial_sensor_sound_clocks_are_left_to_the_last_bit(made):
         assert_array_equal(mended.signals[name].time, signal.time)
 
 
-@pytest.mark.parametrize("length", [LENGTH, 400.0])
-def test_gnss_that_hardly_shows_its_clock_is_moved_by_all_of_the_drive(made, length):
+def test_gnss_that_hardly_shows_its_clock_is_moved_by_all_of_the_drive(made):
     # Speed over ground as noisy as that between fixes: no piece shows the lag alone.
-    bare = without_imu(made.drive).between(0.0, length)
+    bare = without_imu(made.drive)
     ground = bare.signals["gnss_speed"]
     noise = np.random.default_rng(3).normal(0.0, 1.2, len(ground))
     noisy = bare.with_signals(replace(ground, values=np.abs(ground.values + noise)))
     mended = correct_drive(retimed(noisy, ("gnss",), lambda t: t + 5.0))
     moved = mended.signals["gnss_speed"].time - ground.time
     assert np.max(np.abs(moved)) < 0.5
+
+
+def test_in_minutes_gnss_is_moved_though_its_pieces_differ_a_little(made):
+    short = without_imu(made.drive).between(300.0, 700.0)
+    mended = correct_drive(retimed(short, ("gnss",), lambda t: t + 5.0 + 0.5 * (t > 500.0)))
+    moved = mended.signals["gnss_speed"].time - short.signals["gnss_speed"].time
+    assert np.max(np.abs(moved)) < 0.6
 
 
 def inertial_as(drive, change, start=500.0, end=800.0):
