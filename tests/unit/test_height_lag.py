@@ -47,8 +47,9 @@ def of_height(motion):
 def test_late_heights_are_moved_to_their_hills(late, rate):
     motion = find_motion(driven(late, rate=rate))
     (note,) = of_height(motion)
-    told = re.search(r"altitude is ([-+.0-9]+) s late", note.text)
-    assert float(told[1]) == pytest.approx(late, abs=0.6)
+    size, side = re.search(r"altitude shows hills ([.0-9]+) s (\w+)", note.text).groups()
+    assert float(size) == pytest.approx(abs(late), abs=0.6)
+    assert side == ("later" if late > 0.0 else "earlier")
     inner = (motion.time > 30.0) & (motion.time < 1450.0)
     true = np.interp(motion.time, TIME, np.arctan(slope(0.04)))
     assert np.sqrt(np.mean((motion.grade - true)[inner] ** 2)) < 0.008

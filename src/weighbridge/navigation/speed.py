@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from weighbridge.constants import GRAVITY
-from weighbridge.messages import Problem, refused
+from weighbridge.messages import Problem, phrase, refused
 from weighbridge.navigation.height_lag import find_height_lag
 from weighbridge.navigation.longitudinal import LONGEST_GAP, resample
 from weighbridge.navigation.motion import Motion, MotionSource
@@ -57,7 +57,8 @@ def speed_motion(drive: Drive, *, rate: float = 10.0) -> Motion:
         shown = drive.signals[hills]
         moved = drive.with_signals(Signal(hills, shown.time - late.lag, shown.values))
         grade, grade_std, height, source, notes = _grade(moved, time, distance)
-        notes += (Problem.of("altitude.late", hills, by=late.lag),)
+        when = phrase("later" if late.lag > 0.0 else "earlier", by=abs(late.lag))
+        notes += (Problem.of("altitude.late", hills, when=when),)
     nowhere = np.full(time.size, np.nan)
     return Motion(
         source=source,
