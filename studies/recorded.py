@@ -24,9 +24,9 @@ import weighbridge as wb
 from weighbridge.balance import force_balance, windows
 from weighbridge.balance.delay import estimate_torque_delay
 from weighbridge.balance.law import force_on_mass
-from weighbridge.estimators import joint
+from weighbridge.estimators.joint import batch, estimate
 from weighbridge.estimators.joint.problem import UNMODELLED
-from weighbridge.estimators.joint.slow_errors import design, prior_std
+from weighbridge.estimators.joint.terms import TERMS
 from weighbridge.estimators.regression import regression
 from weighbridge.estimators.squat import SQUAT, ResidualSquat
 from weighbridge.io.frame_text import read_candump
@@ -170,14 +170,10 @@ def bmw_loads() -> str:
     )
     drives = trips()
 
-    def with_inertias(table, vehicle, **options):  # type: ignore[no-untyped-def]
-        rows, y = design(table, vehicle, **options)
-        wheels = table.accel / vehicle.driveline.wheel_radius**2
-        return np.column_stack([rows, table.gearing**2 * table.accel, wheels]), y
-
-    def their_std(vehicle, *given, **options):  # type: ignore[no-untyped-def]
-        inertias = vehicle.road.engine_inertia.std, vehicle.road.wheel_inertia.std
-        return np.append(prior_std(vehicle, *given, **options), inertias)
+    inertias = {
+        name: replace(TERMS[name], applies=lambda _: True)
+        for name in ("engine_inertia", "wheel_inertia")
+    }
 
     def usual_lean(*_):  # type: ignore[no-untyped-def]
         return ResidualSquat(*SQUAT)
@@ -202,13 +198,12 @@ def bmw_loads() -> str:
         return {n: wb.weigh(d, vehicle).mass for n, d in drives.items()}
 
     with (
-        patch.object(joint, "design", with_inertias),
-        patch.object(joint, "prior_std", their_std),
-        patch.object(joint, "inertia_relative_std", lambda *_: 0.0),
-        patch.object(joint, "lean", usual_lean),
+        patch.dict(TERMS._own, inertias),
+        patch.object(batch, "inertia_relative_std", lambda *_: 0.0),
+        patch.object(batch, "residual_squat", usual_lean),
     ):
         lines.append(row("inertias estimated, usual lean, torque as read", weighed(as_read)))
-    with patch.object(joint, "lean", usual_lean):
+    with patch.object(batch, "residual_squat", usual_lean):
         lines.append(row("inertias considered", weighed(as_read)))
     lines.append(row("and lean found against the wheels", weighed(as_read)))
     now = weighed(car)
@@ -634,7 +629,7 @@ def canedge_regressions(drives: list[tuple[str, wb.Drive]]) -> str:
     means = " | ".join(f"{m:.2f}, {s:.1f} %" for m, s in zip(rows.mean(0), spread, strict=True))
     weighed = np.array(
         [
-            joint.estimate(force_balance(drive, car, motion, delay=delay), car).mass / reference
+            estimate(force_balance(drive, car, motion, delay=delay), car).mass / reference
             for (_, drive), motion in zip(long, motions, strict=True)
         ]
     )

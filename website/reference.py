@@ -65,6 +65,7 @@ RECIPES = (
     "weighbridge.vehicle.torque_sources.REPORTED",
     "weighbridge.vehicle.torque_sources.ROUGH",
     "weighbridge.estimators.regression.regression",
+    "weighbridge.estimators.joint.terms.Term",
     "weighbridge.estimators.gate.GateSettings",
     "weighbridge.estimators.judging.Evidence",
     "weighbridge.estimators.judging.judge",

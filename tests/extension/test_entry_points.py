@@ -1,13 +1,16 @@
-"""A torque source, a vehicle class and an estimator of another package, from drive to mass."""
+"""Torque source, vehicle class, estimator and term of another package, from drive to mass."""
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from tests.recipes import code, entry_points
 
 import weighbridge as wb
 from weighbridge import ConfigError
 from weighbridge.estimators import ESTIMATORS
+from weighbridge.estimators.joint.terms import TERMS
+from weighbridge.signals import Signal
 from weighbridge.simulation import make_scenario, simulate_car
 from weighbridge.vehicle import TORQUE_SOURCES, VEHICLE_CLASSES
 
@@ -15,16 +18,17 @@ FILES = {
     "fuel_source": code("fuel_source.py"),
     "rickshaw_class": code("rickshaw_class.py"),
     "median_estimator": code("median_estimator.py"),
+    "mud_term": code("mud_term.py"),
 }
 TRIED_ELSEWHERE = {"weighbridge.formats", "weighbridge.sources"}
 POINTS = {group: line for group, line in entry_points().items() if group not in TRIED_ELSEWHERE}
 
-TABLES = (TORQUE_SOURCES, VEHICLE_CLASSES, ESTIMATORS)
+TABLES = (TORQUE_SOURCES, VEHICLE_CLASSES, ESTIMATORS, TERMS)
 
 
 @pytest.fixture
 def package(tmp_path, monkeypatch):
-    """Install a distribution: three modules, one line each."""
+    """Install a distribution: four modules, one line each."""
     for name, text in FILES.items():
         (tmp_path / f"{name}.py").write_text(text)
     info = tmp_path / "weighbridge_more-1.0.dist-info"
@@ -77,6 +81,28 @@ def test_a_package_adds_source_class_and_estimator(package, tmp_path):
     assert every["median"].mass == alone.mass
     weighed.report(tmp_path / "report.html", compare=True)
     assert "median" in (tmp_path / "report.html").read_text(encoding="utf-8")
+
+
+def in_mud(drive, vehicle, drag):
+    """Let the motor of one gear pull against so much [N s/m] more."""
+    torque = drive.signals["engine_torque"]
+    speed = drive.signals["vehicle_speed"].at(torque.time)
+    more = drag * np.nan_to_num(speed) / vehicle.driveline.gearings[0]
+    return drive.with_signals(Signal("engine_torque", torque.time, torque.values + more))
+
+
+def test_a_package_adds_a_term(package, tmp_path):
+    made = [simulate_car(make_scenario("electric", payload=p, seed=904 + p)) for p in (0, 250)]
+    car = wb.calibrate(made[0].drive, float(made[0].truth.mass[0]))
+    muddy, truth = in_mud(made[1].drive, car, 30.0), float(made[1].truth.mass[-1])
+    blind = wb.weigh(muddy, car)
+    seen = wb.weigh(muddy, car, settings={"terms": [*TERMS.own, "mud"]})
+    assert blind.reason_id == "vehicle.foreign"
+    assert seen.mass == pytest.approx(truth, rel=0.03)
+    drag = seen.result.slow_errors.of("mud").value
+    assert np.mean(drag) == pytest.approx(30.0, abs=10.0)
+    seen.report(tmp_path / "report.html")
+    assert "Drag of mud" in (tmp_path / "report.html").read_text(encoding="utf-8")
 
 
 def test_without_the_package_the_names_are_unknown():

@@ -16,7 +16,7 @@ from weighbridge.estimators.considered import (
     sensitivity,
     triangle,
 )
-from weighbridge.estimators.joint.slow_errors import design
+from weighbridge.estimators.joint.terms import design
 from weighbridge.kernels import disturbance as kernel
 from weighbridge.navigation import find_motion
 from weighbridge.simulation import MIDSIZE, Scenario, short_route, simulate_car

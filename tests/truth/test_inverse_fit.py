@@ -16,7 +16,16 @@ from weighbridge.calibration.inverse import (
     fit,
     fit_with_gusts,
 )
-from weighbridge.vehicle import TORQUE_SOURCES, VEHICLE_CLASSES, TorqueTerms, torque_rows
+from weighbridge.vehicle import (
+    TORQUE_SOURCES,
+    VEHICLE_CLASSES,
+    Driveline,
+    RoadLoad,
+    TorqueModel,
+    TorqueTerms,
+    Vehicle,
+    torque_rows,
+)
 
 TRUCK_AREA, TRUCK_ROLLING = 8.0, 0.008
 MASS, DRAG_AREA, ROLLING, ENGINE_INERTIA, WHEEL_INERTIA, RADIUS = 1400.0, 0.62, 0.01, 0.15, 5.0, 0.3
@@ -63,12 +72,26 @@ def made(rng, motion_noise, n=4800, *, mass=MASS, full=growing, unmeasured_grade
     )  # fmt: skip
 
 
+def known(of_class, source, radius):
+    """A vehicle of a class whose road load stands beside the fit as if it were known."""
+    area, rolling = of_class.road_prior(single_speed=False)[0][:2]
+    return Vehicle(
+        kind=of_class.name,
+        driveline=Driveline(wheel_radius=radius),
+        torque=TorqueModel(source=source, coefficients=(0.0, 1.0)),
+        road_load=RoadLoad(
+            drag_area=area, rolling_coefficient=rolling,
+            drag_area_std=0.0, rolling_coefficient_std=0.0,
+        ),
+    )  # fmt: skip
+
+
 def settings_of_load(*, knots=(), knot=0.0):
     return FitSettings(
         source=TORQUE_SOURCES["load"], order=2, curved=True, knots=knots, torque_noise=5.0,
         bounds=TorqueTerms(offset=0.5, growth=0.5, speed_growth=1.0, bend=0.5, knot=knot),
-        cold_torque_std=TORQUE_SOURCES["load"].cold_torque_std,
-        wheel_radius=RADIUS, prior=VEHICLE_CLASSES["car"].road_prior(single_speed=False),
+        vehicle=known(VEHICLE_CLASSES["car"], "load", RADIUS),
+        prior=VEHICLE_CLASSES["car"].road_prior(single_speed=False),
     )  # fmt: skip
 
 
@@ -178,8 +201,8 @@ def test_what_gusts_confound_stays_open():
     settings = FitSettings(
         source=TORQUE_SOURCES["percent"], order=0, curved=False, knots=(), torque_noise=5.0,
         bounds=TorqueTerms(offset=0.05, growth=0.02, speed_growth=0.03, bend=0.05, knot=0.012),
-        cold_torque_std=TORQUE_SOURCES["percent"].cold_torque_std,
-        wheel_radius=0.5, prior=VEHICLE_CLASSES["truck"].road_prior(single_speed=False),
+        vehicle=known(VEHICLE_CLASSES["truck"], "percent", 0.5),
+        prior=VEHICLE_CLASSES["truck"].road_prior(single_speed=False),
     )  # fmt: skip
     told = {fit: [], fit_with_gusts: []}
     for seed in range(3):

@@ -5,9 +5,11 @@ import pytest
 from numba import config
 
 from weighbridge.estimators.joint.changing import largest
-from weighbridge.estimators.joint.problem import FilterInput
-from weighbridge.estimators.joint.slow_errors import filter_params
+from weighbridge.estimators.joint.problem import FilterInput, states_of
+from weighbridge.estimators.joint.settings import JointSettings
+from weighbridge.estimators.joint.terms import Sizes
 from weighbridge.kernels import disturbance
+from weighbridge.vehicle import Provenance, Vehicle
 
 pytestmark = pytest.mark.skipif(bool(config.DISABLE_JIT), reason="runs the filter many times")
 
@@ -24,11 +26,14 @@ def truck(*, launch_error=0.0, late_scale=1.0, told=True):
     force += np.where(launch & (time > 300.0), launch_error, 0.0)
     traction = MASS * phi
     force = np.where(time > 500.0, late_scale, 1.0) * force
+    states = states_of(
+        Vehicle(provenance=Provenance(method="joint")), Sizes(MASS, 0.0), JointSettings()
+    )
     std = np.array([MASS, 100.0, 100.0, 1e-3, 1e-3, 1e-3, 1e-3])
     rows = np.column_stack([phi, np.ones(WINDOWS), np.ones(WINDOWS), np.zeros((WINDOWS, 4))])
     return FilterInput(
         start=disturbance.initial_state(np.array([MASS, *6 * [0.0]]), np.diag(std**2), time[0]),
-        params=filter_params(std, 5.0, 10, 0),
+        params=states._replace(std=std).params(1.0, JointSettings(settle_windows=10)),
         time=time,
         rows=np.ascontiguousarray(rows),
         y=force,

@@ -10,13 +10,10 @@ from tests.noted import error
 
 from weighbridge import ConfigError, Drive, Signal, Vehicle
 from weighbridge.balance import ForceTable, Reason
-from weighbridge.estimators.joint.slow_errors import (
-    DATA_SHEET_NAMES,
-    NAMES,
-    design,
-    inertia_relative_std,
-    prior_std,
-)
+from weighbridge.estimators.joint.problem import states_of
+from weighbridge.estimators.joint.settings import JointSettings
+from weighbridge.estimators.joint.slow_errors import inertia_relative_std
+from weighbridge.estimators.joint.terms import Sizes, design
 from weighbridge.estimators.judging import SQUAT_STD, uncalibrated_std
 from weighbridge.vehicle import (
     Driveline,
@@ -30,6 +27,12 @@ from weighbridge.vehicle import (
 )
 
 GEARS = (12.0, 7.0, 4.5, 3.2)
+CALIBRATED = ("mass", "disturbance", "resistance", "wind_north", "wind_east", "cold_torque",
+              "drag_area")  # fmt: skip
+
+
+def names_of(vehicle):
+    return states_of(vehicle, Sizes(1500.0, 200.0), JointSettings()).names
 
 
 def sheet(**changes):
@@ -70,7 +73,7 @@ def test_a_file_that_does_not_state_the_efficiency_gets_that_of_its_kind(tmp_pat
 def test_what_was_fitted_at_the_wheels_is_left_alone(vehicle):
     assert not by_data_sheet(vehicle)
     assert wheel_efficiency(vehicle) == 1.0
-    assert prior_std(vehicle, 1500.0, 200.0).size == len(NAMES)
+    assert names_of(vehicle) == CALIBRATED
 
 
 def test_the_interval_holds_torque_efficiency_radius_and_lean():
@@ -150,8 +153,9 @@ def test_offset_growth_and_inertias_are_states_of_a_data_sheet():
         )
 
     rows, right = design(table(0.0, 0.0), vehicle)
-    assert rows.shape[1] == len(NAMES) + len(DATA_SHEET_NAMES)
-    assert prior_std(vehicle, 1500.0, 200.0).size == rows.shape[1]
+    found = ("torque_offset", "torque_growth", "engine_inertia", "wheel_inertia")
+    assert names_of(vehicle) == (*CALIBRATED, *found)
+    assert rows.shape[1] == len(CALIBRATED) + len(found)
     errors = np.array([3.0, 2.0, 0.05, 0.5])
     lighter = replace(
         vehicle,
@@ -162,7 +166,7 @@ def test_offset_growth_and_inertias_are_states_of_a_data_sheet():
         ),
     )
     _, wrong = design(table(*errors[:2]), lighter)
-    k = len(NAMES)
+    k = len(CALIBRATED)
     made = rows[:, k : k + 2] @ -errors[:2] + rows[:, k + 2 :] @ errors[2:]
     assert_allclose(wrong - right, made, atol=1e-9)
 
@@ -170,8 +174,7 @@ def test_offset_growth_and_inertias_are_states_of_a_data_sheet():
 def test_with_one_gear_inertias_are_considered_not_estimated():
     """What hills say of them is what the accelerometer errs by, so the mass must not hang on it."""
     electric = Vehicle(driveline=Driveline(gearings=(30.0,), wheel_radius=0.33))
-    states = prior_std(electric, 1500.0, 200.0)
-    assert states.size == len(NAMES) + 2
+    assert names_of(electric) == (*CALIBRATED, "torque_offset", "torque_growth")
     accel = np.sin(np.arange(200.0))
     used = np.ones(200, dtype=bool)
     engine, wheels = electric.road.engine_inertia.std, electric.road.wheel_inertia.std

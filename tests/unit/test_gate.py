@@ -12,6 +12,7 @@ from weighbridge import ConfigError, Status, Vehicle
 from weighbridge.balance import ForceBalance, ForceTable, Reason, force_balance
 from weighbridge.estimators import ESTIMATORS, fit_std, judging
 from weighbridge.estimators.fit_std import honest_std, slow_std
+from weighbridge.estimators.joint.problem import states_of
 from weighbridge.pipeline.weighing import weigh_balance
 from weighbridge.simulation import MIDSIZE, Scenario, short_route, simulate_car
 from weighbridge.vehicle import Driveline, Provenance, RoadLoad, TorqueModel
@@ -204,9 +205,12 @@ def test_slow_errors_add_up_as_their_covariance_says(monkeypatch):
     phi = table.specific_force
     index = np.arange(0, phi.size, 25)
     influence = phi[index] / np.sum(phi[index] ** 2)
-    std = np.zeros(9)
-    std[1] = 400.0
-    monkeypatch.setattr(fit_std, "prior_std", lambda *_: std)
+
+    def of_disturbance(*given):
+        states = states_of(*given)
+        return states._replace(std=np.where(states.levelled, 400.0, 0.0))
+
+    monkeypatch.setattr(fit_std, "states_of", of_disturbance)
     passing, lasting = slow_std(made, BUS, index, influence, MASS)
     apart = np.abs(np.subtract.outer(table.time[index], table.time[index]))
     # Half of the disturbance is gusts, which push in proportion to the speed.

@@ -5,14 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from tests.noted import refused
+from tests.noted import error, refused
 
 import weighbridge as wb
-from weighbridge import Signal
+from weighbridge import ConfigError, Signal
 from weighbridge.balance import Reason, windows
 from weighbridge.estimators import ESTIMATORS
 from weighbridge.estimators.joint import forward as joint_forward
-from weighbridge.estimators.joint.slow_errors import DATA_SHEET_NAMES, design, usable_rows
+from weighbridge.estimators.joint.slow_errors import usable_rows
+from weighbridge.estimators.joint.terms import design
 from weighbridge.estimators.noisy_motion import too_low
 from weighbridge.navigation import without_accelerometer
 from weighbridge.simulation import MIDSIZE, Scenario, short_route, simulate_car
@@ -87,6 +88,24 @@ def test_a_body_that_leans_with_its_load_costs_little(balance, car):
         return abs(joint.estimate(leaning, car, settings).mass / upright - 1.0)
 
     assert off(None) < 0.8 * off(joint.settings(load_pitch_std=0.0))
+
+
+def test_terms_are_picked_by_settings(balance, car):
+    few = ("mass", "disturbance", "resistance", "drag_area")
+    whole, part = (
+        joint.estimate(balance, car),
+        joint.estimate(balance, car, joint.settings(terms=few)),
+    )
+    assert set(part.slow_errors.found) == set(few[1:])
+    assert not part.slow_errors.of("wind_north").value.any()
+    assert part.mass == pytest.approx(whole.mass, rel=0.02)
+    # What is taken for known leaves less open.
+    assert part.bound_std < whole.bound_std
+    for terms in (("resistance", "mass"), ("mass", "mass"), ()):
+        with error(ConfigError, "begin with mass"):
+            joint.settings(terms=terms)
+    with error(ConfigError, "wind_north"):
+        joint.settings(terms=("mass", "wind_nort"))
 
 
 def test_torque_errors_that_act_through_the_gear_weigh_less_in_short_gears(
@@ -193,7 +212,8 @@ def test_a_speed_model_leaves_the_torque_of_a_data_sheet_alone(made, car):
     by_speed = replace(sheet, provenance=replace(sheet.provenance, method="speed-ekf"))
     assert_allclose(wb.weigh(drive, by_speed).mass, weighing.mass, rtol=1e-9)
     slow = weighing.result.slow_errors
-    assert set(DATA_SHEET_NAMES) < set(slow.constants)
+    of_sheet = {"torque_offset", "torque_growth", "engine_inertia", "wheel_inertia"}
+    assert of_sheet < set(slow.constants)
 
 
 @pytest.mark.parametrize(("factor", "status"), [(1.3, "converged"), (3.5, "inconsistent")])

@@ -414,12 +414,8 @@ def test_disturbance_keeps_its_unit_and_band(tmp_path, round_trip):
     forces = [f for f in drawn.values() if "Force against" in f["layout"]["yaxis"]["title"]["text"]]
     assert len(forces) == 2
     slow = w.result.slow_errors
-    for figure, force, std in zip(
-        forces,
-        (slow.disturbance, slow.resistance),
-        (slow.disturbance_std, slow.resistance_std),
-        strict=True,
-    ):
+    for figure, name in zip(forces, ("disturbance", "resistance"), strict=True):
+        force, std, _ = slow.of(name)
         area, middle = (numbers(trace["y"]) for trace in figure["data"])
         # There along the low edge, back along the high one.
         low, high = area[: area.size // 2], area[area.size // 2 :][::-1]

@@ -69,6 +69,13 @@ def test_texts_are_read_as_toml():
     assert parsed(["process_var=0.1, 1e-12,5e-3"]) == {"process_var": [0.1, 1e-12, 5e-3]}
 
 
+def test_words_with_commas_are_a_list():
+    given = parsed(["terms=mass, drag_area,disturbance"])
+    assert given == {"terms": ["mass", "drag_area", "disturbance"]}
+    assert ESTIMATORS["joint"].settings_of(given).terms == ("mass", "drag_area", "disturbance")
+    assert ESTIMATORS["joint"].settings_of(parsed(["terms=mass"])).terms == ("mass",)
+
+
 @pytest.mark.parametrize("text", ["forgetting", "=1", "gate=", "gate=5;0", "gate=1\nmass=2"])
 def test_a_text_of_another_form_is_one_sentence(text):
     with error(ConfigError, "=") as refused:

@@ -15,22 +15,16 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from weighbridge.balance import WINDOW, Windows, law, windows
-from weighbridge.balance.law import DISTURBANCE_STD
 from weighbridge.balance.table import ForceTable
-from weighbridge.constants import GRAVITY
 from weighbridge.errors import DriveError
 from weighbridge.estimators.joint import JointSettings
-from weighbridge.estimators.joint.slow_errors import (
-    RESISTANCE_STD,
-    TIME_CONSTANTS,
-    WIND_STD,
-    noise_variance,
-)
+from weighbridge.estimators.joint.slow_errors import noise_variance
+from weighbridge.estimators.joint.terms import COLD_LASTS, Sizes, Term, terms_of
 from weighbridge.estimators.noisy_motion import too_low
 from weighbridge.kernels import disturbance as kernel
 from weighbridge.navigation import Motion
 from weighbridge.signals import Bools, Floats
-from weighbridge.vehicle import TorqueSource, TorqueTerms
+from weighbridge.vehicle import TorqueSource, TorqueTerms, Vehicle
 
 
 class TooShort(DriveError):
@@ -89,6 +83,11 @@ class InverseFit:
 AROUND: Final = 60.0
 """Pressures are averaged over so long before and after [s]."""
 
+BESIDE: Final = (
+    "disturbance", "resistance", "wind_north", "wind_east", "cold_torque", "ratio_lateness",
+)  # fmt: skip
+"""Terms that another drive has another state of."""
+
 TYPICAL_SPEED: Final = 300.0
 """Engine speed at which the growth of torque terms is given [rad/s]."""
 
@@ -117,10 +116,8 @@ class FitSettings:
     knots : engine speeds of a smooth correction of torque per reading [rad/s]
     bounds : what is known of the terms before
     torque_noise : of one reading, as torque [N m]
-    wheel_radius : [m]
+    vehicle : its driveline, and its road load as if that were known
     prior : mean and standard deviation (4,) of C_d A, C_r, I_e, I_w
-    cold_torque_std : of what the cold takes of the torque, over the highest torque [-]
-    usual_gearing, stepless : of `weighbridge.vehicle.driveline.Driveline` [1/m]
     lasting_drag : learn the drag area from the lasting part of the pressure alone; what comes and
         goes within `AROUND` is taken with that of the class
     window : length of the windows [s]
@@ -133,14 +130,16 @@ class FitSettings:
     knots: tuple[float, ...]
     bounds: TorqueTerms
     torque_noise: float
-    wheel_radius: float
+    vehicle: Vehicle
     prior: tuple[Floats, Floats]
-    cold_torque_std: float
-    usual_gearing: float = 0.0
-    stepless: bool = False
     lasting_drag: bool = False
     window: float = WINDOW
     rounds: int = 3
+
+    @property
+    def beside(self) -> tuple[Term, ...]:
+        """Terms that stand beside what is fitted, with a state of each drive."""
+        return terms_of(self.vehicle, BESIDE)
 
 
 def terms_covariance(
@@ -267,7 +266,7 @@ def fit(drives: list[DriveRows], settings: FitSettings) -> InverseFit:
     # motion is noisy the motion would explain nothing.
     readings = [np.zeros_like(d.regressor) for d in drives]
     for _ in range(settings.rounds):
-        design = _design(drives, cuts, readings, centre, settings)
+        design = _design(drives, cuts, readings, (scale, centre), settings)
         state = _solve(design, [d.regressor for d in drives], scale, settings)
         readings = [
             _fitted(d, columns, state, scale, settings)
@@ -289,7 +288,7 @@ def log_likelihoods(
     """
     cuts, _ = _cut(drives, settings)
     none = [np.zeros_like(d.regressor) for d in drives]
-    design = _design(drives, cuts, none, np.zeros(_extra(settings)), settings)
+    design = _design(drives, cuts, none, (1.0, np.zeros(_extra(settings))), settings)
     found = []
     for each in readings:
         read = [replace(d, regressor=reading) for d, reading in zip(drives, each, strict=True)]
@@ -354,13 +353,23 @@ def _torque_per_reading(drives: list[DriveRows]) -> float:
     return float(np.median(slopes))
 
 
-def _columns(d: DriveRows, reading: Floats, centre: Floats, settings: FitSettings) -> Floats:
-    """Columns of one drive: motion, road load, torque terms, disturbances."""
-    table = d.table
-    north, east = law.wind_columns(table)
+def _columns(
+    d: DriveRows, reading: Floats, taken: tuple[float, Floats], settings: FitSettings
+) -> Floats:
+    """Columns of one drive: motion, road load, torque terms, and what stands beside them.
+
+    Parameters
+    ----------
+    d : the drive
+    reading : fitted (n,), for columns that need it
+    taken : rough torque per reading, and `_centre`
+    settings
+    """
+    scale, centre = taken
+    table = replace(d.table, traction_force=scale * d.table.gearing * reading)
     mass = d.mass - table.fuel_burnt
     pushed = mass * table.specific_force + d.beside
-    road = law.road_columns(table, mass, settings.wheel_radius)
+    road = law.road_columns(table, mass, settings.vehicle.driveline.wheel_radius)
     if settings.lasting_drag:
         lasting = lasting_pressure(table)
         pushed = pushed + settings.prior[0][0] * (law.drag_column(table) - lasting)
@@ -372,14 +381,11 @@ def _columns(d: DriveRows, reading: Floats, centre: Floats, settings: FitSetting
         *road.T,
         # The reading itself stands on the left; the other torque terms stand here.
         *-beside.T,
-        law.gust_column(table, d.motion.unmeasured_grade, usual_gearing=settings.usual_gearing),
-        law.resistance_column(table),
-        north,
-        east,
-        law.cold_torque_column(table),
+        *(
+            term.column(table, settings.vehicle, d.motion.unmeasured_grade)
+            for term in settings.beside
+        ),
     ]
-    if table.ratio_rate is not None:
-        columns.append(law.lateness_column(table, table.gearing * reading))
     return np.asarray(np.nan_to_num(np.column_stack(columns)))
 
 
@@ -414,15 +420,13 @@ def _design(
     drives: list[DriveRows],
     cuts: list[Windows],
     readings: list[Floats],
-    centre: Floats,
+    taken: tuple[float, Floats],
     settings: FitSettings,
 ) -> _Design:
     """Average the columns of all drives over their windows."""
     mass = float(np.mean([d.mass for d in drives]))
     gearings = [np.nan_to_num(d.table.gearing) for d in drives]
-    columns = [
-        _columns(d, each, centre, settings) for d, each in zip(drives, readings, strict=True)
-    ]
+    columns = [_columns(d, each, taken, settings) for d, each in zip(drives, readings, strict=True)]
     times, variances = [], []
     clock = 0.0
     for d, cut, gearing in zip(drives, cuts, gearings, strict=True):
@@ -464,18 +468,10 @@ def _solve(
     gearing = np.concatenate([cut.mean(g) for cut, g, _ in parts])
     torque = float(np.percentile(reached / np.maximum(gearing, 1e-3), 98.0))
     terms = terms_covariance(settings.bounds, settings, torque, torque / scale)
-    fading = np.array(
-        [
-            design.mass * float(np.hypot(DISTURBANCE_STD, GRAVITY * design.grade)),
-            design.mass * RESISTANCE_STD,
-            WIND_STD * mean[0],
-            WIND_STD * mean[0],
-            settings.cold_torque_std * torque,
-            *([scale * law.LATENESS_STD] if settings.stepless else ()),
-        ]
-    )
+    sizes = Sizes(design.mass, torque, design.grade)
+    fading = np.array([term.std(settings.vehicle, sizes) for term in settings.beside])
     # What is constant over a drive is another in the next.
-    fades = (*TIME_CONSTANTS, *([TIME_CONSTANTS[-1]] if settings.stepless else ()))
+    fades = [min(term.time_constant, COLD_LASTS) for term in settings.beside]
     x0 = np.concatenate(([1.0], mean, np.zeros(extra), np.zeros(fading.size)))
     prior = block_diag(np.diag(np.square([0.5, *std])), terms, np.diag(np.square(fading)))
     params = kernel.DisturbanceParams(

@@ -47,7 +47,7 @@ from weighbridge.navigation import BY_SPEED
 from weighbridge.results import DelaySearch
 from weighbridge.signals import Floats
 from weighbridge.signals.lag import STEP, beyond, lowest, parabola
-from weighbridge.vehicle import Driveline, Provenance, RoadLoad, Timing, Vehicle, cold_torque_std
+from weighbridge.vehicle import Driveline, Provenance, RoadLoad, Timing, Vehicle
 
 LAGS: Final = (0.0, 0.1, 0.2, 0.3, 0.4)
 """Time constants of the reading's smoothing that are tried [s]. Longer ones pass for the smoothness
@@ -258,8 +258,12 @@ def _drive_rows(problem: Problem, rows: Sequence[DelayedRows]) -> list[DriveRows
 
 def _settings(problem: Problem, noise: float) -> FitSettings:
     """State what is fitted and what is known before, with a noise of the torque [N m]."""
+    prior = _prior(problem.draft, problem.base.driveline)
     named = replace(problem.draft.torque, source=problem.source.name, coefficients=(0.0, 1.0))
-    seen = replace(problem.draft, torque=named)
+    area, rolling = (float(value) for value in prior[0][:2])
+    known = RoadLoad(
+        drag_area=area, rolling_coefficient=rolling, drag_area_std=0.0, rolling_coefficient_std=0.0
+    )
     return FitSettings(
         source=problem.source,
         order=problem.order,
@@ -267,11 +271,8 @@ def _settings(problem: Problem, noise: float) -> FitSettings:
         knots=(),
         bounds=problem.source.terms,
         torque_noise=noise,
-        wheel_radius=problem.draft.driveline.wheel_radius,
-        prior=_prior(problem.draft, problem.base.driveline),
-        usual_gearing=problem.draft.driveline.usual_gearing,
-        stepless=problem.draft.driveline.stepless,
-        cold_torque_std=cold_torque_std(seen),
+        vehicle=replace(problem.draft, torque=named, road_load=known),
+        prior=prior,
     )
 
 
@@ -358,7 +359,7 @@ class _Misfits:
             readings = [[tried[k].reading for tried in drives] for k in of_delay]
             given = _drive_rows(self.problem, rows)
             misfits[of_delay] = np.negative(log_likelihoods(given, readings, self.settings))
-        if self.settings.stepless:
+        if self.problem.draft.driveline.stepless:
             totals = np.array([delay + lag for delay, lag in pairs])
             misfits += 0.5 * np.square(UNMODELLED * (totals - USUAL_DELAY) / STEPLESS_SPREAD)
         return misfits

@@ -11,13 +11,9 @@ from weighbridge.balance import ForceBalance
 from weighbridge.balance.force_balance import highest_torque
 from weighbridge.estimators.considered import fit_consider_std, force_columns
 from weighbridge.estimators.gate import GateSettings
-from weighbridge.estimators.joint.slow_errors import (
-    LASTING,
-    NAMES,
-    TIME_CONSTANTS,
-    design,
-    prior_std,
-)
+from weighbridge.estimators.joint.problem import states_of
+from weighbridge.estimators.joint.settings import JointSettings
+from weighbridge.estimators.joint.terms import Sizes, design, terms_of
 from weighbridge.estimators.judging import Evidence, judge
 from weighbridge.estimators.noisy_motion import row_noise_std, too_noisy
 from weighbridge.estimators.track import Status
@@ -28,10 +24,7 @@ from weighbridge.vehicle import Vehicle
 
 BIN: Final = 2.5
 """Time over which a slow error counts as one [s]: it is short beside the shortest of
-`weighbridge.estimators.joint.slow_errors.TIME_CONSTANTS`."""
-
-
-COLD: Final = NAMES.index("cold_torque")
+`weighbridge.estimators.joint.terms`."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -88,29 +81,31 @@ def slow_std(
     if not (index.size and np.isfinite(mass) and mass > 0.0):
         return float("inf"), 0.0
     rows, _ = design(table, vehicle, unmeasured_grade=balance.motion.unmeasured_grade)
-    highest = highest_torque(table.torque[index])
-    std = prior_std(_known_road_load(vehicle), mass, highest)
-    # The methods that ask have `weighbridge.estimators.judging.consider_std` for the cold.
-    std[COLD] = 0.0
+    sizes, usual = Sizes(mass, highest_torque(table.torque[index])), JointSettings()
+    states = states_of(_known_road_load(vehicle), sizes, usual)
+    terms = terms_of(vehicle)
     effect = influence[:, None] * np.nan_to_num(rows[index])
     whole = effect.sum(axis=0)
     time = table.time[index]
     number = ((time - time[0]) // BIN).astype(np.int64)
     passing = 0.0
-    for k in range(1, LASTING):
+    for k, term in enumerate(terms):
+        if term.lasting:
+            continue
         binned = np.bincount(number, effect[:, k]).astype(np.float64)
-        keep = float(np.exp(-BIN / TIME_CONSTANTS[k - 1]))
-        passing += std[k] ** 2 * _correlated(binned, keep)
+        keep = float(np.exp(-BIN / term.time_constant))
+        passing += states.std[k] ** 2 * _correlated(binned, keep)
     if vehicle.provenance.fit_cov:
         moved = influence @ force_columns(balance, vehicle, mass)[index]
         passing += (mass * fit_consider_std(vehicle, moved, mass)) ** 2
         return float(np.sqrt(passing)), 0.0
     # What a file says of its own road load is in the resistance and the last states.
-    open_ = prior_std(vehicle, mass, highest)
-    open_[COLD] = 0.0
-    stays = np.sqrt(np.maximum(open_**2 - std**2, 0.0)) * whole
-    stays[len(NAMES) :] = open_[len(NAMES) :] * whole[len(NAMES) :]
-    return float(np.sqrt(passing)), float(np.linalg.norm(stays[1:]))
+    open_ = states_of(vehicle, sizes, usual).std
+    lasting = np.array([term.lasting for term in terms])
+    stays = np.where(lasting, open_, np.sqrt(np.maximum(open_**2 - states.std**2, 0.0))) * whole
+    # The methods that ask have `weighbridge.estimators.judging.consider_std` for the cold.
+    stays[[term.name in ("mass", "cold_torque") for term in terms]] = 0.0
+    return float(np.sqrt(passing)), float(np.linalg.norm(stays))
 
 
 def honest_std(scatter: float, blocks: int, slow: float, systematic: float) -> tuple[float, float]:

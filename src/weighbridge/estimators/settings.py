@@ -12,11 +12,11 @@ from typing import Any, Final
 from weighbridge.arguments import suggestion, type_name
 from weighbridge.errors import ConfigError
 
-WORD: Final = re.compile(r"(?!(true|false|nan|inf)$)[a-z][a-z-]*")
+WORD: Final = re.compile(r"(?!(true|false|nan|inf)$)[a-z][a-z_-]*")
 """A choice, which a command has without quotes."""
 
 LIST: Final = re.compile(r"[^\[\],\"]+(,[^\[\],\"]+)+")
-"""Numbers with commas between them, which a command has without brackets."""
+"""Numbers or words with commas between them, which a command has without brackets."""
 
 
 def changed(settings: Any, given: Mapping[str, object]) -> Any:
@@ -24,8 +24,9 @@ def changed(settings: Any, given: Mapping[str, object]) -> Any:
 
     Parameters
     ----------
-    settings : a frozen dataclass of numbers, switches, choices, tuples of numbers and settings
-        within; in place of None a number is taken: another part of vehicle or drive gives it
+    settings : a frozen dataclass of numbers, switches, choices, tuples of numbers or words and
+        settings within; in place of None a number is taken: another part of vehicle or drive
+        gives it
     given : new values by name; ``ekf.start.threshold`` names one of settings within
 
     Raises
@@ -62,12 +63,16 @@ def parsed(texts: Sequence[str]) -> dict[str, object]:
         if WORD.fullmatch(value):
             found[name] = value
             continue
+        words = [word.strip() for word in value.split(",")]
+        if len(words) > 1 and all(map(WORD.fullmatch, words)):
+            found[name] = words
+            continue
         whole = f"[{value}]" if LIST.fullmatch(value) else value
         try:
             found[name] = tomllib.loads(f"value = {whole}")["value"]
         except tomllib.TOMLDecodeError:
             raise ConfigError(
-                f"{text!r}: a number, true, false, a word, or numbers with commas, is expected "
+                f"{text!r}: a number, true, false, a word, or several with commas, is expected "
                 "after ="
             ) from None
     return found
@@ -110,6 +115,11 @@ def _like(old: Any, name: str, value: Any) -> Any:
     elif isinstance(old, int):
         fits, wanted = number and value == int(value), "a whole number"
         value = int(value) if fits else value
+    elif isinstance(old, tuple) and old and isinstance(old[0], str):
+        value = [value] if isinstance(value, str) else value
+        fits = isinstance(value, list | tuple) and all(isinstance(v, str) for v in value)
+        wanted = "words with commas"
+        value = tuple(value) if fits else value
     elif isinstance(old, tuple):
         # An empty one says that there may be numbers; the settings know how many.
         fits = isinstance(value, list | tuple) and (not old or len(value) == len(old))

@@ -10,10 +10,10 @@ from weighbridge.balance import ForceBalance, law
 from weighbridge.balance.instants import behind
 from weighbridge.balance.table import ForceTable
 from weighbridge.constants import GRAVITY
-from weighbridge.estimators.joint.slow_errors import RESISTANCE_STD
+from weighbridge.estimators.joint.terms import RESISTANCE_STD, terms_of
 from weighbridge.kernels import speed_torque_ekf as kernel
 from weighbridge.signals import Bools, Floats, Ints
-from weighbridge.vehicle import Vehicle, by_data_sheet
+from weighbridge.vehicle import Vehicle
 
 ROLLING_STD: Final = RESISTANCE_STD / GRAVITY
 """Standard deviation of the slow error of the rolling coefficient [-]: a fifth of a car's."""
@@ -98,10 +98,8 @@ def constant_columns(table: ForceTable, vehicle: Vehicle) -> list[Floats]:
     Drag area and friction of a cold start in the reading; of a data sheet offset of the torque and
     its growth with engine speed as well.
     """
-    columns = [law.drag_column(table), law.cold_torque_column(table)]
-    if by_data_sheet(vehicle):
-        columns += [law.torque_offset_column(table), law.torque_growth_column(table)]
-    return columns
+    names = ("drag_area", "cold_torque", "torque_offset", "torque_growth")
+    return [term.column(table, vehicle, 0.0) for term in terms_of(vehicle, names)]
 
 
 def span_means(time: Floats, values: Floats, edges: Floats) -> Floats:

@@ -32,7 +32,8 @@ from weighbridge.estimators.joint.forward import (
     identify_joint,
     resumed,
 )
-from weighbridge.estimators.joint.slow_errors import design, usable_rows
+from weighbridge.estimators.joint.slow_errors import usable_rows
+from weighbridge.estimators.joint.terms import design
 from weighbridge.estimators.judging import STOP
 from weighbridge.kernels import window_means
 from weighbridge.kernels.ins_model import E_SQUAT, SQUAT
@@ -233,7 +234,7 @@ NO_WINDOWS: Final = Running(np.empty(0), np.empty(0), np.empty(0))
 
 def begin(setup: ForwardSetup, start: float) -> ForwardState:
     """Return the state before the first record, which comes at ``start`` [s] or later."""
-    columns = 4 + setup.joint.std.size
+    columns = 4 + setup.joint.states.std.size
     return ForwardState(
         motion=forward.begin(setup.navigation, start),
         windows=window_means.initial_state(columns),  # type: ignore[no-untyped-call]
@@ -387,7 +388,8 @@ def _folded(
     if set_off is None and moving[new].any():
         set_off = float(table.time[new][np.argmax(moving[new])])
     table = replace(table, set_off=set_off)
-    rows, y = design(table, setup.vehicle, squat_accel=sizes.body.squat_accel(table.specific_force))
+    squat_accel = sizes.body.squat_accel(table.specific_force)
+    rows, y = design(table, setup.vehicle, sizes.states.names, squat_accel=squat_accel)
     beside = accessory_column(table, setup.vehicle)
     values = np.column_stack([table.time, y, table.force_std**2, beside, rows])
     windows, means, count, stood = window_means.run(

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from weighbridge.balance.law import wind_columns
 from weighbridge.balance.table import ForceTable
 from weighbridge.estimators import MassTrack
+from weighbridge.estimators.joint.terms import TERMS
 from weighbridge.report.methods_section import apart, method_style
 from weighbridge.report.style import BLUE, GREY, VERMILLION, Panel, Section, blank, dots, line
 from weighbridge.report.text import amount
@@ -135,21 +135,22 @@ def residual_section(weighing: MassResult, comparison: Sequence[MassResult]) -> 
 
 
 def slow_force(result: MassTrack, vehicle: Vehicle) -> Floats:
-    """Force that was found beside the mass at each row: disturbance, resistance, wind (n,) [N].
+    """Force that was found beside the mass at each row and comes and goes (n,) [N].
 
-    Zero where the method finds none.
+    Disturbance, resistance and wind; zero where the method finds none.
     """
     table, slow = result.balance.table, result.slow_errors
     if slow is None or not slow.time.size:
         return np.zeros(table.time.size)
 
-    def at(values: Floats) -> Floats:
-        return np.interp(table.time, slow.time, values)
-
-    north, east = wind_columns(table)
-    wind = np.nan_to_num(north * at(slow.wind_north) + east * at(slow.wind_east))
-    area = vehicle.road.drag_area.value
-    return np.asarray(at(slow.disturbance) + at(slow.resistance) + area * wind)
+    force = np.zeros(table.time.size)
+    for name, found in slow.found.items():
+        if not found.lasting:
+            term, value = TERMS[name], np.interp(table.time, slow.time, found.value)
+            # What is levelled is a force already.
+            column = 1.0 if term.levelled else np.nan_to_num(term.column(table, vehicle, 0.0))
+            force += column * value
+    return force
 
 
 def _slow_part(result: MassTrack, vehicle: Vehicle) -> str:

@@ -12,7 +12,8 @@ import numpy as np
 from weighbridge.balance.instants import WIND_AT_VEHICLE
 from weighbridge.constants import GRAVITY
 from weighbridge.customary import shown_amount, shown_unit
-from weighbridge.estimators.joint.slow_errors import WIND_STD, SlowErrors
+from weighbridge.estimators.joint.slow_errors import Found, SlowErrors
+from weighbridge.estimators.joint.terms import TERMS, WIND_STD
 from weighbridge.report.maps import mark, positions, track_map
 from weighbridge.report.style import (
     BLUE,
@@ -34,6 +35,8 @@ from weighbridge.report.thinning import SCATTER_POINTS, single, thin_line
 from weighbridge.signals import Bools, Drive, Floats, from_si, scalar_from_si
 
 if TYPE_CHECKING:
+    from plotly.graph_objects import Figure
+
     from weighbridge.report.tiles import Tiles
     from weighbridge.results.weighing import MassResult
 
@@ -99,11 +102,12 @@ def wind_at_vehicle(slow: SlowErrors, drive: Drive) -> Wind:
     if speed and direction is not None:
         north = float(WIND_AT_VEHICLE * speed * np.cos(direction))
         east = float(WIND_AT_VEHICLE * speed * np.sin(direction))
+    from_north, from_east = (slow.of(name) for name in ("wind_north", "wind_east"))
     return Wind(
         time=slow.time,
-        north=slow.wind_north + north,
-        east=slow.wind_east + east,
-        std=slow.wind_std,
+        north=from_north.value + north,
+        east=from_east.value + east,
+        std=np.column_stack([from_north.std, from_east.std]),
         reported=(north, east),
     )
 
@@ -129,17 +133,16 @@ def slow_section(weighing: MassResult, tiles: Tiles | None = None) -> Section:
                 weighing,
                 "Force that lasts half a minute",
                 "gusts, faults of grade and torque, unseen braking",
-                slow.disturbance,
-                slow.disturbance_std,
+                slow.of("disturbance"),
             ),
             force_panel(
                 weighing,
                 "Force that lasts a quarter of an hour",
                 "tyres and oil that warm, an accelerometer that drifts",
-                slow.resistance,
-                slow.resistance_std,
+                slow.of("resistance"),
             ),
             *accessory_panels(weighing),
+            *further_panels(weighing, slow),
             wind_panel(weighing, wind, blind),
             wind_map(weighing, wind, blind, tiles),
             disturbance_map(weighing, slow, tiles),
@@ -168,29 +171,16 @@ def accessory_panels(weighing: MassResult) -> tuple[Panel, ...]:
     )
 
 
-CONSTANTS: Final = {
-    "cold_torque": ("friction of the cold start in the torque", "N m"),
-    "drag_area": ("drag area above the vehicle file's", "m²"),
-    "torque_offset": ("torque the file's model has too much", "N m"),
-    "torque_growth": ("the same, grown with engine speed, at 200 rad/s", "N m"),
-    "engine_inertia": ("engine inertia above the file's", "kg m²"),
-    "wheel_inertia": ("wheel inertia above the file's", "kg m²"),
-    "ratio_lateness": ("lateness of the engine speed against the torque", "s"),
-}
-"""What the states that last as long as the drive are, and their units."""
-
-
 def constants_table(slow: SlowErrors) -> Table | None:
     """List what was found beside the mass that does not change over the drive."""
     rows = tuple(
         (
-            text,
-            *_with_digits(shown_amount(value, unit), shown_amount(REACH * std, unit)),
-            shown_unit(unit),
+            term.title,
+            *_with_digits(shown_amount(value, term.unit), shown_amount(REACH * std, term.unit)),
+            shown_unit(term.unit),
         )
-        for name, (text, unit) in CONSTANTS.items()
-        if name in slow.constants
-        for value, std in [slow.constants[name]]
+        for name, (value, std) in slow.constants.items()
+        for term in [TERMS[name]]
         if std > 0.0
     )
     if not rows:
@@ -204,22 +194,45 @@ def _with_digits(value: float, half: float) -> tuple[str, str]:
     return f"{value:+.{places}f}".replace("-", "−"), f"{half:.{places}f}"
 
 
-def force_panel(weighing: MassResult, what: str, causes: str, force: Floats, std: Floats) -> Panel:
-    """Draw a force over time with its band."""
+def band_over_time(weighing: MassResult, found: Found, axis: str) -> Figure:
+    """Draw a state over time with its band."""
     assert weighing.result is not None
     assert weighing.result.slow_errors is not None
     time = minutes(weighing.drive, weighing.result.slow_errors.time)
-    figure = blank(TIME_AXIS, "Force against the motion [N]")
-    half = REACH * std
-    x, middle, low, high = thin_line(time, force, force - half, force + half, points=POINTS)
+    figure, half = blank(TIME_AXIS, axis), REACH * found.std
+    x, middle, low, high = thin_line(
+        time, found.value, found.value - half, found.value + half, points=POINTS
+    )
     band(figure, x, low, high, "95 % band")
     line(figure, x, middle, "estimated", BLUE, line_width=1.6)
     figure.add_hline(y=0.0, line={"color": GREY, "width": 1})
-    size = float(np.sqrt(np.mean(force**2)))
+    return figure
+
+
+def further_panels(weighing: MassResult, slow: SlowErrors) -> tuple[Panel, ...]:
+    """Draw what comes and goes beside force and wind: terms of other packages."""
+    shown = ("disturbance", "resistance", "wind_north", "wind_east")
+    return tuple(
+        Panel(
+            title=f"{term.title[:1].upper()}{term.title[1:]}",
+            caption="The band is of 95 %.",
+            figure=band_over_time(weighing, found, f"{term.title} [{shown_unit(term.unit)}]"),
+        )
+        for name, found in slow.found.items()
+        for term in [TERMS[name]]
+        if not found.lasting and name not in shown
+    )
+
+
+def force_panel(weighing: MassResult, what: str, causes: str, found: Found) -> Panel:
+    """Draw a force over time with its band."""
+    assert weighing.result is not None
+    figure = band_over_time(weighing, found, "Force against the motion [N]")
+    size = float(np.sqrt(np.mean(found.value**2)))
     slope = 100.0 * size / (weighing.result.mass * GRAVITY)
     return Panel(
         title=f"{what}: {amount(size, 'N')}, as a slope of {slope:.2f} %"
-        if stands_out(force, std)
+        if stands_out(found)
         else f"{what}: none stands out",
         caption=f"{amount(size, 'N')} root mean square over the drive; causes are {causes}. "
         "Positive holds back.",
@@ -267,16 +280,17 @@ def disturbance_map(weighing: MassResult, slow: SlowErrors, tiles: Tiles | None)
     if track is None:
         # The map of the road says so.
         return Panel(title="Disturbance on the map")
-    if not stands_out(slow.disturbance, slow.disturbance_std):
+    disturbance = slow.of("disturbance")
+    if not stands_out(disturbance):
         return Panel(
             title="Disturbance on the map",
             absent="no map of the half-minute force: none stands out.",
         )
     rows = np.unique(np.linspace(0, slow.time.size - 1, SCATTER_POINTS).astype(np.int64))
     figure = track_map(track, tiles)
-    reach = float(np.percentile(np.abs(slow.disturbance), 98.0))
+    reach = float(np.percentile(np.abs(disturbance.value), 98.0))
     mark(
-        figure, track.at(slow.time[rows]), slow.disturbance[rows], "Force [N]", "RdBu",
+        figure, track.at(slow.time[rows]), disturbance.value[rows], "Force [N]", "RdBu",
         (-reach, reach), size=6, reversescale=True,
     )  # fmt: skip
     return Panel(
@@ -288,9 +302,9 @@ def disturbance_map(weighing: MassResult, slow: SlowErrors, tiles: Tiles | None)
     )
 
 
-def stands_out(force: Floats, std: Floats) -> bool:
+def stands_out(found: Found) -> bool:
     """Whether a force is larger on the whole than what is not known of it."""
-    return bool(np.mean(force**2) > np.mean(std**2))
+    return bool(np.mean(found.value**2) > np.mean(found.std**2))
 
 
 def wind_map(weighing: MassResult, wind: Wind, blind: bool, tiles: Tiles | None) -> Panel:

@@ -27,20 +27,20 @@ from weighbridge.estimators.joint.problem import (
     FilterInput,
     JointSizes,
     Problem,
+    States,
+    states_of,
 )
 from weighbridge.estimators.joint.settings import JointSettings
 from weighbridge.estimators.joint.slow_errors import (
-    LASTING,
     SlowErrors,
-    design,
     inertia_relative_std,
     noise_variance,
-    prior_std,
     usable_rows,
     window_motion_variance,
     with_variance,
 )
 from weighbridge.estimators.joint.switched import Switched, find_switched, without_switched
+from weighbridge.estimators.joint.terms import A_DRIVE, Sizes, design
 from weighbridge.estimators.judging import (
     HIDDEN_BRAKE_STD,
     OTHER_METHOD_STD,
@@ -148,7 +148,8 @@ def estimate(
     """
     settings = settings or JointSettings()
     table = balance.table
-    rows, y = design(table, vehicle, unmeasured_grade=balance.motion.unmeasured_grade)
+    grade = balance.motion.unmeasured_grade
+    rows, y = design(table, vehicle, settings.terms, unmeasured_grade=grade)
     usable = usable_rows(table, rows, y)
     cut = windows(table.time, usable)
     row_reason = table.reason.copy()
@@ -250,6 +251,7 @@ def _ask(
         rows, y = design(
             table,
             vehicle,
+            settings.terms,
             squat_accel=squat_accel,
             unmeasured_grade=balance.motion.unmeasured_grade,
         )
@@ -261,7 +263,7 @@ def _ask(
             y=sums,
             odds=change_odds(stood, by_speed=balance.motion.source in BY_SPEED),
             variance=noise_variance(table, cut, guess, balance.motion),
-            std=_prior(balance, vehicle, cut, guess),
+            states=_states(balance, vehicle, cut, guess, settings),
             settings=settings,
         )
         return _Asked(problem=problem, body=body, rows=rows, y=y, stood=stood)
@@ -276,7 +278,7 @@ def _solve(asked: _Asked) -> _Solved:
     fast, slow = problem.likeliest()
     start, noise, params = problem.kernel_input(fast, slow)
     _, running, running_var, begins = problem.changes(fast, slow)
-    added = np.where(begins[:, None], problem.jump_var, 0.0)
+    added = np.where(begins[:, None], problem.states.jump_std**2, 0.0)
     x, var, taken, weight = disturbance.smooth(
         start, problem.time, problem.rows, problem.y, noise, added, params
     )
@@ -321,7 +323,7 @@ def _track(
     made = vehicle.provenance
     factor = made.std_factor or UNMODELLED
     given = _given(asked, solved, cut.mean(table.traction_force - asked.y))
-    end, _, possible = averaged(given, problem.std, problem.settings, factor)
+    end, _, possible = averaged(given, problem.states, problem.settings, factor)
     stds = np.sqrt(solved.var[:, 0])
     smoothed[-1], stds[-1] = end.x[0] * (1.0 + low[-1]), np.sqrt(end.cov[0, 0])
     mass, bound = float(smoothed[-1] - burnt[-1]), float(np.sqrt(solved.var[-1, 0]))
@@ -363,7 +365,7 @@ def _track(
         balance=balance,
         running_mass=track,
         running_std=np.where(last >= 0, np.hypot(track_std, track * systematic), np.nan),
-        residual=np.where(used, asked.y - _explained(asked.rows, solved.x[seen]), np.nan),
+        residual=np.where(used, asked.y - _explained(asked, solved.x[seen]), np.nan),
         row_reason=row_reason,
         mass=mass,
         std=std,
@@ -377,12 +379,7 @@ def _track(
         reason=reason,
         segments=_segments(table, time, solved.begins, smoothed, factor * stds, systematic),
         slow_errors=SlowErrors.from_states(
-            time,
-            solved.x,
-            solved.var,
-            solved.running_var,
-            problem.rows[:, 1],
-            stepless=vehicle.driveline.stepless,
+            time, problem.states, solved.x, solved.var, solved.running_var, problem.rows
         ),
         filter_input=given,
         possible_change=possible,
@@ -440,7 +437,7 @@ def _sizes(
 ) -> JointSizes:
     """Keep what the drive shows of noise; ``attenuating`` is that of the motion [m^2/s^4]."""
     return JointSizes(
-        std=asked.problem.std,
+        states=asked.problem.states,
         fast=solved.fast,
         slow=solved.slow,
         body=asked.body,
@@ -470,12 +467,14 @@ def _given(asked: _Asked, solved: _Solved, beside: Floats) -> FilterInput:
     )
 
 
-def _explained(rows: Floats, x: Floats) -> Floats:
-    """Force of the mass and of what lasts as long as the drive (n,) [N].
+def _explained(asked: _Asked, x: Floats) -> Floats:
+    """Force of the mass and of what lasts as long as the drive, by states (n, k) (n,) [N].
 
     Disturbance, slow resistance and wind stay in the residual.
     """
-    return np.asarray(rows[:, 0] * x[:, 0] + np.sum(rows[:, LASTING:] * x[:, LASTING:], axis=1))
+    rows, lasting = asked.rows, asked.problem.states.time_constant > A_DRIVE
+    lasting[0] = False
+    return np.asarray(rows[:, 0] * x[:, 0] + np.sum((rows * x)[:, lasting], axis=1))
 
 
 def _systematic_std(balance: ForceBalance, vehicle: Vehicle, mass: float) -> float:
@@ -512,10 +511,12 @@ def _systematic_std(balance: ForceBalance, vehicle: Vehicle, mass: float) -> flo
     return left
 
 
-def _prior(balance: ForceBalance, vehicle: Vehicle, cut: Windows, guess: float) -> Floats:
-    """Standard deviations of the states before the drive has shown, of a rough mass [kg]."""
+def _states(
+    balance: ForceBalance, vehicle: Vehicle, cut: Windows, guess: float, settings: JointSettings
+) -> States:
+    """Return the states before the drive has shown, of a rough mass [kg]."""
     torque = highest_torque(balance.table.torque[cut.index])
-    return prior_std(vehicle, guess, torque, unmeasured_grade=balance.motion.unmeasured_grade)
+    return states_of(vehicle, Sizes(guess, torque, balance.motion.unmeasured_grade), settings)
 
 
 def _segments(

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from weighbridge.estimators.joint.slow_errors import NAMES
 from weighbridge.estimators.track import MassTrack
 
 
@@ -33,8 +32,8 @@ def shown_drag_area(track: MassTrack | None) -> DragArea | None:
     """
     if track is None or track.slow_errors is None or track.sizes is None:
         return None
-    value, std = track.slow_errors.constants["drag_area"]
-    before = float(track.sizes.std[NAMES.index("drag_area")])
+    value, std = track.slow_errors.constants.get("drag_area", (0.0, 0.0))
+    before = track.sizes.states.std_of("drag_area")
     # A hundredth of the information is rounding.
     if not 0.0 < std < 0.995 * before:
         return None

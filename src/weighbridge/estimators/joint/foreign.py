@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from typing import Final
 
 import numpy as np
 
 from weighbridge.constants import GRAVITY
-from weighbridge.estimators.joint.slow_errors import NAMES, prior_std
+from weighbridge.estimators.joint.terms import TERMS, Sizes
 from weighbridge.estimators.track import MassTrack
 from weighbridge.messages import Problem
 from weighbridge.vehicle import Vehicle
@@ -36,14 +37,15 @@ def stretched(track: MassTrack, vehicle: Vehicle) -> float:
     slow = track.slow_errors
     if slow is None or not (np.isfinite(track.mass) and track.mass > 0.0):
         return 0.0
-    # The torque is only the size of the cold start's.
-    prior = dict(zip(NAMES, prior_std(vehicle, track.mass, 1.0), strict=False))
-    grade = GRAVITY * track.mass * float(np.median(track.balance.motion.grade_std))
-    std = float(np.hypot(prior["resistance"], grade))
-    resistance = float(np.sqrt(np.mean(slow.resistance**2))) / std
-    area, _ = slow.constants["drag_area"]
-    drag = area / prior["drag_area"] if prior["drag_area"] > 0.0 else 0.0
-    return float(np.hypot(resistance, drag))
+    sizes = Sizes(track.mass, 0.0)
+    far = 0.0
+    if "resistance" in slow.found:
+        grade = GRAVITY * track.mass * float(np.median(track.balance.motion.grade_std))
+        std = float(np.hypot(TERMS["resistance"].std(vehicle, sizes), grade))
+        far = float(np.sqrt(np.mean(slow.found["resistance"].value ** 2))) / std
+    if "drag_area" in slow.found and (std := TERMS["drag_area"].std(vehicle, sizes)) > 0.0:
+        far = math.hypot(far, slow.constants["drag_area"][0] / std)
+    return far
 
 
 def of_another(vehicle: Vehicle, track: MassTrack) -> tuple[bool, Problem | None]:

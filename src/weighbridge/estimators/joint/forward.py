@@ -94,13 +94,13 @@ def resumed(given: FilterInput, setup: JointSetup, until: float) -> JointState:
     part = given.first(seen)
     open_from = _open_from(part, setup)
     known = part.first(open_from)
-    end, same, _ = averaged(known, setup.std, setup.settings, setup.std_factor)
+    end, same, _ = averaged(known, setup.states, setup.settings, setup.std_factor)
     total = part.weight()
     jumps = np.flatnonzero(known.added.any(axis=1))
     before = part.first(int(jumps[-1])).weight() if jumps.size else 0.0
     load = load_change.initial_state(end)._replace(rows=open_from)  # type: ignore[no-untyped-call]
     mass, var = end.x[0], end.cov[0, 0]
-    weighed = load_params(given.params, setup.std, setup.settings)
+    weighed = load_params(given.params, setup.states, setup.settings)
     for k in range(open_from, seen):
         odds = part.odds[k] if k == open_from else np.nan
         load, mass, var, _ = load_change.step(
@@ -169,7 +169,7 @@ def step(state: JointState, window: Window, setup: JointSetup) -> JointState:
     As of `weighbridge.estimators.joint.estimate`; attenuation: Fuller, Measurement Error
     Models, 1987, ch. 1, 2.
     """
-    start, params = first_state(setup.std, setup.slow, window.time, setup.settings)
+    start, params = first_state(setup.states, setup.slow, window.time, setup.settings)
     load, at_load, at_trial = state.load, state.total_at_load, state.total_at_trial
     switch = state.switch
     if load is None:
@@ -189,7 +189,7 @@ def step(state: JointState, window: Window, setup: JointSetup) -> JointState:
     odds = float(change_odds(np.array([window.stood]))[0]) if long else np.nan
     weight = disturbance.weight(load.same, window.time, window.row, noise, params)
     trial_row = load.trial_row
-    weighed = load_params(params, setup.std, setup.settings)
+    weighed = load_params(params, setup.states, setup.settings)
     load, mass, var, changed = load_change.step(
         load, window.time, window.row, y, noise, odds, weighed
     )

@@ -9,7 +9,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from weighbridge.estimators.joint.problem import FilterInput, load_params
+from weighbridge.estimators.joint.problem import FilterInput, States, load_params
 from weighbridge.estimators.joint.settings import JointSettings
 from weighbridge.kernels import disturbance, load_change
 from weighbridge.messages import Problem, phrase
@@ -93,7 +93,7 @@ def enough_windows(settings: JointSettings) -> int:
     return load_change.FOLLOWED * settings.fewest_windows
 
 
-def averaged(given: FilterInput, std: Floats, settings: JointSettings, factor: float) -> Averaged:
+def averaged(given: FilterInput, prior: States, settings: JointSettings, factor: float) -> Averaged:
     """Return the state after the last window over all hypotheses of a change of load more or less.
 
     Without a change found at a stop, each row after it says how probable one is: the states
@@ -105,7 +105,7 @@ def averaged(given: FilterInput, std: Floats, settings: JointSettings, factor: f
     Parameters
     ----------
     given : of the estimator
-    std : (k,) of the states before the drive has shown
+    prior : states before the drive has shown
     settings
     factor : errors of the mass over what the filter says of them, by which the covariance will be
         widened [-]
@@ -115,7 +115,7 @@ def averaged(given: FilterInput, std: Floats, settings: JointSettings, factor: f
     Bayesian model averaging; Gaussian sum merged by its moments: Bar-Shalom, Li, Kirubarajan,
     Estimation with Applications to Tracking and Navigation, 2001, ch. 11.6.
     """
-    weighed = load_params(given.params, std, settings)
+    weighed = load_params(given.params, prior, settings)
 
     def run(added: Floats) -> disturbance.DisturbanceState:
         return disturbance.run(  # type: ignore[no-any-return]

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from weighbridge.estimators.joint.settings import JointSettings
-from weighbridge.estimators.joint.slow_errors import filter_params
+from weighbridge.estimators.joint.terms import Sizes, terms_of
 from weighbridge.estimators.squat import ResidualSquat
 from weighbridge.kernels import disturbance, load_change
 from weighbridge.signals import Bools, Floats
 from weighbridge.signals.minimum import lowest_by_simplex
+from weighbridge.vehicle import Vehicle
 
 UNMODELLED: Final = 1.6
 """Errors of the mass over what the filter says of them, where no calibration has shown it [-]:
@@ -26,45 +27,92 @@ _CLOSE: Final = 0.03
 """It ends where they, and the logarithm of the likelihood, differ by less [-]."""
 
 
+class States(NamedTuple):
+    """The states of a drive, as the kernels read them.
+
+    Attributes
+    ----------
+    names : (k,) of their terms
+    std : (k,) before the drive has shown; that of the mass is its guess as well
+    time_constant : (k,) [s]
+    jump_std : (k,) by which they may jump where the load changes
+    levelled : (k,) whether the drive shows how large they are
+    """
+
+    names: tuple[str, ...]
+    std: Floats
+    time_constant: Floats
+    jump_std: Floats
+    levelled: Bools
+
+    def params(self, slow: float, settings: JointSettings) -> disturbance.DisturbanceParams:
+        """Parameters of the filter, at a level of what the drive shows the size of [-]."""
+        std = self.at_level(slow)
+        return disturbance.DisturbanceParams(
+            time_constant=self.time_constant,
+            std=np.where(np.isfinite(self.time_constant), std, 0.0),
+            gate=settings.gate,
+            settle_rows=settings.settle_windows,
+            # No change of load is believed sooner.
+            jump_rows=settings.fewest_windows,
+        )
+
+    def at_level(self, slow: float) -> Floats:
+        """Standard deviations (k,) at a level of what the drive shows the size of [-]."""
+        return np.where(self.levelled, slow * self.std, self.std)
+
+    def std_of(self, name: str) -> float:
+        """Standard deviation of one of them; 0 where it is none."""
+        return float(self.std[self.names.index(name)]) if name in self.names else 0.0
+
+
+def states_of(vehicle: Vehicle, sizes: Sizes, settings: JointSettings) -> States:
+    """Return the states of the terms that settings pick, before the drive has shown.
+
+    Parameters
+    ----------
+    vehicle : its drag area, rolling resistance and inertias are as uncertain as its ``road`` says
+    sizes : of the drive
+    settings
+    """
+    terms = terms_of(vehicle, settings.terms)
+    return States(
+        names=tuple(term.name for term in terms),
+        std=np.array([term.std(vehicle, sizes) for term in terms]),
+        time_constant=np.array([term.time_constant for term in terms]),
+        jump_std=np.array([term.jump(settings) * sizes.mass for term in terms]),
+        levelled=np.array([term.levelled for term in terms]),
+    )
+
+
 def first_state(
-    std: Floats, slow: float, time: float, settings: JointSettings
+    states: States, slow: float, time: float, settings: JointSettings
 ) -> tuple[disturbance.DisturbanceState, disturbance.DisturbanceParams]:
     """State to start from and parameters of the filter.
 
     Parameters
     ----------
-    std : (k,) of the states before the drive has shown; that of the mass is its guess as well
+    states : of which that of the mass is its guess as well
     slow : level of the disturbance over its usual size [-]
     time : of the first window [s]
     settings
     """
-    std = std.copy()
-    std[1] *= slow
+    std = states.at_level(slow)
     begin = np.zeros(std.size)
     begin[0] = std[0]
     start = disturbance.initial_state(  # type: ignore[no-untyped-call]
         begin, np.diag(std**2), time
     )
-    # No change of load is believed sooner.
-    params = filter_params(std, settings.gate, settings.settle_windows, settings.fewest_windows)
-    return start, params
-
-
-def jump_variance(std: Floats, settings: JointSettings) -> Floats:
-    """Variance (k,) by which each state of ``std`` may jump where the load changes."""
-    jump = np.zeros(std.size)
-    jump[0] = settings.change_std * std[0]
-    jump[2] = settings.load_pitch_std * std[0]
-    return jump**2
+    return start, states.params(slow, settings)
 
 
 def load_params(
-    params: disturbance.DisturbanceParams, std: Floats, settings: JointSettings
+    params: disturbance.DisturbanceParams, states: States, settings: JointSettings
 ) -> load_change.LoadParams:
-    """How the hypotheses of the load are weighed, by the sizes of the states (k,)."""
+    """How the hypotheses of the load are weighed, by the jumps of the states."""
     return load_change.LoadParams(
         filter=params,
-        jump_var=jump_variance(std, settings),
+        jump_var=states.jump_std**2,
         temper=1.0 / UNMODELLED**2,
         fewest=settings.fewest_windows,
     )
@@ -81,7 +129,7 @@ class Problem:
     y : (m,) force that is left for them [N]
     odds : (m,) logarithm of the odds that the load changed before a window; NaN where it cannot
     variance : (m,) of the usual fast noise of ``y`` [N^2]
-    std : (k,) of the states before the drive has shown; that of the mass is its guess as well
+    states : before the drive has shown; that of the mass is its guess as well
     settings
     """
 
@@ -90,20 +138,15 @@ class Problem:
     y: Floats
     odds: Floats
     variance: Floats
-    std: Floats
+    states: States
     settings: JointSettings
 
     def kernel_input(
         self, fast: float, slow: float
     ) -> tuple[disturbance.DisturbanceState, Floats, disturbance.DisturbanceParams]:
         """State to start from, noise variance and parameters at a level of noise."""
-        start, params = first_state(self.std, slow, float(self.time[0]), self.settings)
+        start, params = first_state(self.states, slow, float(self.time[0]), self.settings)
         return start, fast**2 * self.variance, params
-
-    @property
-    def jump_var(self) -> Floats:
-        """Variance (n,) by which each state may jump where the load changes."""
-        return jump_variance(self.std, self.settings)
 
     def likeliest(self) -> tuple[float, float]:
         """Levels of fast noise and of the disturbance, over their usual sizes [-].
@@ -139,7 +182,7 @@ class Problem:
             self.y,
             noise,
             self.odds,
-            load_params(params, self.std, self.settings),
+            load_params(params, self.states, self.settings),
         )
 
 
@@ -190,7 +233,7 @@ class JointSizes:
 
     Attributes
     ----------
-    std : (k,) of the states; that of the mass is its guess as well
+    states : of which that of the mass is its guess as well
     fast, slow : levels of the noise over their usual sizes [-]
     body : squat that rows and torque do not have in common
     motion_var : variance of the specific force of a window [m^2/s^4]
@@ -202,7 +245,7 @@ class JointSizes:
     settings : of the estimator
     """
 
-    std: Floats
+    states: States
     fast: float
     slow: float
     body: ResidualSquat
@@ -216,4 +259,4 @@ class JointSizes:
     @property
     def mass(self) -> float:
         """Guess of the mass [kg]."""
-        return float(self.std[0])
+        return float(self.states.std[0])

@@ -1,37 +1,23 @@
-"""The slow errors that look like mass, and how large each may be."""
+"""What a drive shows beside its mass, and the fast noise of its windows."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Final, TypeVar
+from typing import Final, NamedTuple, TypeVar
 
 import numpy as np
 
 from weighbridge.balance import WINDOW, Windows, law
-from weighbridge.balance.law import DISTURBANCE_STD
 from weighbridge.balance.table import ForceTable
-from weighbridge.constants import GRAVITY
-from weighbridge.estimators.regression import regression
+from weighbridge.estimators.joint.problem import States
+from weighbridge.estimators.joint.terms import A_DRIVE
 from weighbridge.estimators.squat import share_of_accel
-from weighbridge.kernels.disturbance import DisturbanceParams
 from weighbridge.navigation import BY_SPEED, Motion
 from weighbridge.signals import Bools, Floats
-from weighbridge.vehicle import Vehicle, by_data_sheet, cold_torque_std
-from weighbridge.vehicle.data_sheet import offset_std
+from weighbridge.vehicle import Vehicle, by_data_sheet
 
 Variance = TypeVar("Variance", float, Floats)
-
-TIME_CONSTANTS: Final = (30.0, 900.0, 600.0, 600.0, 2e4)
-"""How long disturbance, resistance, wind north and east and cold torque last [s]: gusts,
-grade and torque errors half a minute, rolling resistance and offsets a quarter of an
-hour, mean wind ten minutes; how cold a drive began stays the same all along."""
-
-RESISTANCE_STD: Final = 0.017
-"""Of the slow resistance, over mass [m/s^2]: a fifth of the rolling resistance of a car."""
-
-WIND_STD: Final = 2.0
-"""Of each component of the wind at the vehicle [m/s]."""
 
 UNMEASURED_NOISE: Final = 0.03
 """Noise of one sample of a specific force that no accelerometer measured [m/s^2]."""
@@ -46,24 +32,19 @@ much."""
 MOTION_WINDOW_STD: Final = 0.007
 """Fast error of the mean of a window without such noise [m/s^2]."""
 
-NAMES: Final = ("mass", "disturbance", "resistance", "wind_north", "wind_east", "cold_torque",
-                "drag_area")  # fmt: skip
-"""The states, in order."""
 
-LASTING: Final = NAMES.index("cold_torque")
-"""From this state on they last as long as the drive."""
+class Found(NamedTuple):
+    """What one state came out as, one row per window.
 
-DATA_SHEET_NAMES: Final = ("torque_offset", "torque_growth", "engine_inertia", "wheel_inertia")
-"""Further states, constant, of a vehicle file from a data sheet alone, in order: what a
-calibration finds once is found from each drive. An offset of the torque works through the
-gear, and low gears go with strong acceleration: taken for none it makes mass. So does
-friction that grows with engine speed, which is high where torque is. The inertias are states
-where there are several gears: with one they are like the scale and the lean of the
-accelerometer, which would be taken for them (`inertia_relative_std`)."""
+    Attributes
+    ----------
+    value, std : (m,)
+    lasting : whether it stays the same all along the drive
+    """
 
-
-RATIO_LATENESS: Final = "ratio_lateness"
-"""Further state, constant, of a stepless gearbox: how late its ratio is against the torque."""
+    value: Floats
+    std: Floats
+    lasting: bool
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -75,120 +56,48 @@ class SlowErrors:
     time : (m,) [s]
     mass_bound : (m,) standard deviation of the mass as known at each window, by the noise
         of this drive alone [kg]
-    disturbance, disturbance_std : (m,) force of half a minute [N]
-    resistance, resistance_std : (m,) force of a quarter of an hour [N]
-    wind_north, wind_east : (m,) what the wind blows towards the south and west at the
-        vehicle, which is a head wind for one who drives north or east [m/s]
-    wind_std : (m, 2) their standard deviations [m/s]
-    constants : the states that last as long as the drive, by name, each with its standard
-        deviation: ``cold_torque``, friction of the start in the reading [N m]; ``drag_area``, C_d A
-        above that of the vehicle file [m^2]; and those of `DATA_SHEET_NAMES`: by how much the
-        file's model of the torque gives too much [N m], the part of it that grows with engine
-        speed, at `USUAL_SPEED` [N m], and inertias above those of the file [kg m^2]; and
-        `RATIO_LATENESS` [s]
+    found : each state by the name of its `weighbridge.estimators.joint.terms.Term`, in its unit;
+        the ``disturbance`` as a force at the window, gusts and all
     """
 
     time: Floats
     mass_bound: Floats
-    disturbance: Floats
-    disturbance_std: Floats
-    resistance: Floats
-    resistance_std: Floats
-    wind_north: Floats
-    wind_east: Floats
-    wind_std: Floats
-    constants: dict[str, tuple[float, float]]
+    found: dict[str, Found]
+
+    @property
+    def constants(self) -> dict[str, tuple[float, float]]:
+        """Value at the end and standard deviation of the states that last as long as the drive."""
+        return {
+            name: (float(x.value[-1]), float(x.std[-1]))
+            for name, x in self.found.items()
+            if x.lasting
+        }
+
+    def of(self, name: str) -> Found:
+        """What a state came out as; zeros where the estimator had none of that name."""
+        nothing = np.zeros(self.time.size)
+        return self.found.get(name, Found(nothing, nothing, lasting=False))
 
     @classmethod
     def from_states(
-        cls,
-        time: Floats,
-        x: Floats,
-        var: Floats,
-        mass_var: Floats,
-        gusts: Floats,
-        *,
-        stepless: bool = False,
+        cls, time: Floats, states: States, x: Floats, var: Floats, mass_var: Floats, rows: Floats
     ) -> SlowErrors:
         """Name the states of the filter.
 
         Parameters
         ----------
         time : (m,) of the windows [s]
-        x, var : (m, k) smoothed states in the order of `NAMES`, and their variances
+        states : which they are
+        x, var : (m, k) smoothed, and their variances
         mass_var : (m,) variance of the mass as known at each window [kg^2]
-        gusts : (m,) `weighbridge.balance.law.gust_column` of each window, by which the disturbance
-            is a force
-        stepless : whether the last state is `RATIO_LATENESS`
+        rows : (m, k) of the windows: a fast disturbance is a force by its own
         """
-        names = (*NAMES, *DATA_SHEET_NAMES)[: x.shape[1] - stepless]
-        return cls(
-            time=time,
-            mass_bound=np.sqrt(mass_var),
-            disturbance=gusts * x[:, 1],
-            disturbance_std=gusts * np.sqrt(var[:, 1]),
-            resistance=x[:, 2],
-            resistance_std=np.sqrt(var[:, 2]),
-            wind_north=x[:, 3],
-            wind_east=x[:, 4],
-            wind_std=np.sqrt(var[:, 3:5]),
-            constants={
-                name: (float(x[-1, k]), float(np.sqrt(var[-1, k])))
-                for k, name in enumerate((*names, *([RATIO_LATENESS] if stepless else ())))
-                if k >= LASTING
-            },
-        )
-
-
-def design(
-    table: ForceTable,
-    vehicle: Vehicle,
-    *,
-    squat_accel: Floats | None = None,
-    unmeasured_grade: float = 0.0,
-) -> tuple[Floats, Floats]:
-    """Rows of the model ``y = phi m + d + c + wind + cold torque + drag``.
-
-    Each column is that of `weighbridge.balance.law`.
-
-    Parameters
-    ----------
-    table, vehicle
-    squat_accel : (n,) what squat of the body adds to the specific force [m/s^2]
-    unmeasured_grade : what of the grade nothing has measured [rad]
-
-    Returns
-    -------
-    rows : (n, 7) for `NAMES`, or (n, 9) or (n, 11) with `DATA_SHEET_NAMES`, and one more for
-        `RATIO_LATENESS`; the mass is that of the first row
-    y : (n,) traction less drag and rotating inertia, and what the fuel that is burnt by then
-        would have weighed [N]
-    """
-    phi, y = regression(table, vehicle)
-    if squat_accel is not None:
-        phi = phi - squat_accel
-    area = vehicle.road.drag_area.value
-    north, east = law.wind_columns(table)
-    columns = [
-        phi,
-        law.gust_column(table, unmeasured_grade, usual_gearing=vehicle.driveline.usual_gearing),
-        law.resistance_column(table),
-        area * north,
-        area * east,
-        law.cold_torque_column(table),
-        law.drag_column(table),
-    ]
-    if by_data_sheet(vehicle):
-        line = vehicle.driveline
-        columns += [law.torque_offset_column(table), law.torque_growth_column(table)]
-        if not line.single_speed:
-            columns += [
-                law.engine_inertia_column(np.nan_to_num(table.gearing), table.engine_accel),
-                law.wheel_inertia_column(table.accel, line.wheel_radius),
-            ]
-    if vehicle.driveline.stepless:
-        columns.append(law.lateness_column(table, np.nan_to_num(table.traction_force)))
-    return np.column_stack(columns), y + phi * table.fuel_burnt
+        found = {}
+        for k, name in enumerate(states.names[1:], start=1):
+            unit = rows[:, k] if states.levelled[k] else 1.0
+            std = np.abs(unit) * np.sqrt(var[:, k])
+            found[name] = Found(unit * x[:, k], std, bool(states.time_constant[k] > A_DRIVE))
+        return cls(time=time, mass_bound=np.sqrt(mass_var), found=found)
 
 
 def usable_rows(table: ForceTable, rows: Floats, y: Floats) -> Bools:
@@ -247,52 +156,6 @@ def with_variance(motion: Motion, variance: float) -> Motion:
     """Return a motion whose `motion_variance` over a window is this [m^2/s^4]."""
     level = np.sqrt(max(variance - MOTION_WINDOW_STD**2, 0.0)) / MOTION_SHARE
     return replace(motion, specific_force_std=float(level))
-
-
-def prior_std(
-    vehicle: Vehicle, mass: float, torque: float, *, unmeasured_grade: float = 0.0
-) -> Floats:
-    """Standard deviations (k,) of the states of `design` before the drive has shown.
-
-    Parameters
-    ----------
-    vehicle : its drag area, rolling resistance and inertias are as uncertain as its ``road`` says
-    mass : rough [kg]; its own standard deviation is as large
-    torque : highest of the drive [N m]
-    unmeasured_grade : what of the grade nothing has measured; the disturbance takes it [rad]
-    """
-    road = vehicle.road
-    grade = GRAVITY * unmeasured_grade
-    resistance = float(np.hypot(RESISTANCE_STD, GRAVITY * road.rolling_coefficient.std))
-    states = [
-        mass,
-        mass * float(np.hypot(DISTURBANCE_STD, grade)),
-        mass * resistance,
-        WIND_STD,
-        WIND_STD,
-        cold_torque_std(vehicle) * torque,
-        road.drag_area.std,
-    ]
-    if by_data_sheet(vehicle):
-        states += offset_std(vehicle, torque)
-        if not vehicle.driveline.single_speed:
-            states += [road.engine_inertia.std, road.wheel_inertia.std]
-    if vehicle.driveline.stepless:
-        states.append(law.LATENESS_STD)
-    return np.array(states)
-
-
-def filter_params(std: Floats, gate: float, settle_rows: int, jump_rows: int) -> DisturbanceParams:
-    """Make the kernel's parameters from the standard deviations of the states."""
-    lasting = np.full(std.size, np.inf)
-    lasting[1 : 1 + len(TIME_CONSTANTS)] = TIME_CONSTANTS
-    return DisturbanceParams(
-        time_constant=lasting,
-        std=np.where(np.isfinite(lasting), std, 0.0),
-        gate=gate,
-        settle_rows=settle_rows,
-        jump_rows=jump_rows,
-    )
 
 
 def inertia_relative_std(

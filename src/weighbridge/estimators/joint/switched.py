@@ -119,7 +119,7 @@ def find_switched(
             problem.time, problem.rows, problem.y, noise, power * column, added, how,
         )  # fmt: skip
 
-    usual, spread, sure = problem.std[0] * USUAL_POWER, POWER_SPREAD, SURE
+    usual, spread, sure = problem.states.std[0] * USUAL_POWER, POWER_SPREAD, SURE
     if known is not None:
         usual, spread, sure = known, KNOWN_SPREAD, SURE_KNOWN
 
