@@ -279,6 +279,17 @@ def test_a_range_too_small_for_gravity_is_told(car):
     assert problem.id == "imu.clipped"
 
 
+def test_an_axis_along_the_road_at_its_limit_is_refused(car):
+    drive, _ = car
+    force = columns(drive, ACCEL)
+    cut = np.column_stack([np.clip(force[:, 0], -0.8, 0.8), force[:, 1:]])
+    found = [p for p in check_drive(replaced(drive, ACCEL, cut)) if p.serious]
+    assert {(p.id, p.signal) for p in found} == {("imu.clipped", "accel_x")}
+    spiked = force.copy()
+    spiked[np.random.default_rng(5).random(len(force)) < 0.05] = 40.0
+    assert "imu.clipped" not in {p.id for p in check_drive(replaced(drive, ACCEL, spiked))}
+
+
 def at_ten_hertz(drive):
     """Average the inertial samples over a tenth of a second."""
     for names in (ACCEL, GYRO):

@@ -129,6 +129,23 @@ def test_a_splice_on_one_clock_is_found(trips):
     assert not any(find_splices(t) for t in trips)
 
 
+@pytest.mark.parametrize("factor", [1.0 / 1.609344, 1.609344])
+def test_a_speed_that_changes_its_scale_while_the_engine_goes_on_is_no_splice(trips, factor):
+    drive = trips[0].without("latitude", "longitude", "altitude", "gnss_speed", "gnss_course")
+    speed, engine = drive.signals["vehicle_speed"], drive.signals["engine_speed"]
+    steady = np.abs(np.gradient(engine.values)) + 20.0 * (speed.at(engine.time) < 19.0)
+    at = float(engine.time[50 + np.argmin(np.convolve(steady, np.ones(15), "same")[50:-50])])
+    # A speed that stays the same may be old.
+    new = speed.values + 0.01 * (np.arange(len(speed)) % 2)
+    scaled = np.where(speed.time < at, 1.0, factor) * new
+    changed = drive.with_signals(Signal("vehicle_speed", speed.time, scaled))
+    assert not find_splices(changed)
+    # Where the engine speed jumps as well, another recording begins.
+    jumped = np.where(engine.time < at, 1.0, 0.7) * engine.values
+    spliced = changed.with_signals(Signal("engine_speed", engine.time, jumped))
+    assert [c.why for c in find_splices(spliced)] == ["jumps of the speed"]
+
+
 def test_of_joined_recordings_read_as_one_drive_the_longest_is_used(trips):
     cut = []
     for trip, shift, length in zip(trips, (0.0, 0.1, 0.2), (200.0, 300.0, 250.0), strict=True):
