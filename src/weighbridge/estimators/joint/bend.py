@@ -13,7 +13,6 @@ from typing import Final
 import numpy as np
 
 from weighbridge.estimators.joint.problem import UNMODELLED, FilterInput
-from weighbridge.kernels import disturbance
 from weighbridge.limits import SURE
 from weighbridge.messages import Problem
 from weighbridge.signals import Drive, Floats
@@ -91,31 +90,9 @@ def torque_bend(given: FilterInput, force: Floats, gain: Floats, knee: float) ->
 
 
 def _along(given: FilterInput, force: Floats, knee: float) -> TorqueBend:
-    """Estimate the bend as one more state of the filter.
-
-    References
-    ----------
-    A bias of known shape as a further state: Friedland, IEEE Trans. Automatic Control 14, 1969.
-    """
-    start, params = given.start, given.params
-    count = start.x.size
-    cov = np.zeros((count + 1, count + 1))
-    cov[:count, :count], cov[count, count] = start.cov, PRIOR_STD**2
-    state, *_ = disturbance.run(
-        disturbance.initial_state(  # type: ignore[no-untyped-call]
-            np.append(start.x, 0.0), cov, start.time
-        ),
-        given.time,
-        np.ascontiguousarray(np.column_stack([given.rows, -force])),
-        given.y,
-        given.noise,
-        np.ascontiguousarray(np.column_stack([given.added, np.zeros(force.size)])),
-        params._replace(
-            time_constant=np.append(params.time_constant, np.inf), std=np.append(params.std, 0.0)
-        ),
-    )
-    std = UNMODELLED * float(np.sqrt(state.cov[count, count]))
-    return TorqueBend(float(state.x[count]), std, knee)
+    """Estimate the bend as one more state of the filter."""
+    state = given.with_term(-force, PRIOR_STD).end()
+    return TorqueBend(float(state.x[-1]), UNMODELLED * float(np.sqrt(state.cov[-1, -1])), knee)
 
 
 def bent(bend: TorqueBend | None, drive: Drive, vehicle: Vehicle) -> Problem | None:

@@ -9,7 +9,6 @@ import numpy as np
 
 from weighbridge.estimators.joint.load_stops import loadable
 from weighbridge.estimators.joint.problem import FilterInput
-from weighbridge.kernels import disturbance
 from weighbridge.limits import CERTAIN
 from weighbridge.messages import Problem, phrase
 from weighbridge.navigation import MotionSource
@@ -187,23 +186,5 @@ def _with_stops(given: FilterInput, same: float) -> float:
 
 def _run(given: FilterInput, shape: Floats, added: Floats) -> tuple[float, float, float]:
     """Log-likelihood with a column of this shape, and the change with its standard deviation."""
-    column = (given.traction * shape)[:, None]
-    x = np.append(given.start.x, 0.0)
-    cov = np.zeros((x.size, x.size))
-    cov[:-1, :-1] = given.start.cov
-    cov[-1, -1] = SCALE_STD**2
-    start = disturbance.initial_state(x, cov, given.start.time)  # type: ignore[no-untyped-call]
-    params = given.params._replace(
-        time_constant=np.append(given.params.time_constant, np.inf),
-        std=np.append(given.params.std, 0.0),
-    )
-    state, *_ = disturbance.run(
-        start,
-        given.time,
-        np.ascontiguousarray(np.hstack([given.rows, column])),
-        given.y,
-        given.noise,
-        np.hstack([added, np.zeros_like(column)]),
-        params,
-    )
+    state = replace(given, added=added).with_term(given.traction * shape, SCALE_STD).end()
     return float(state.log_likelihood), float(state.x[-1]), float(np.sqrt(state.cov[-1, -1]))

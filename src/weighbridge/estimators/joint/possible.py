@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -117,12 +117,7 @@ def averaged(given: FilterInput, prior: States, settings: JointSettings, factor:
     """
     weighed = load_params(given.params, prior, settings)
 
-    def run(added: Floats) -> disturbance.DisturbanceState:
-        return disturbance.run(  # type: ignore[no-any-return]
-            given.start, given.time, given.rows, given.y, given.noise, added, given.params
-        )[0]
-
-    same = run(given.added)
+    same = given.end()
     changed = np.asarray(np.any(given.added > 0.0, axis=1))
     found = np.flatnonzero(np.isfinite(given.odds) & changed)
     stops = np.flatnonzero(np.isfinite(given.odds) & ~changed)
@@ -134,7 +129,7 @@ def averaged(given: FilterInput, prior: States, settings: JointSettings, factor:
     for k in (*stops, *found):
         added = given.added.copy()
         added[k] = 0.0 if changed[k] else weighed.jump_var
-        states.append(run(added))
+        states.append(replace(given, added=added).end())
         gain = states[-1].log_likelihood - same.log_likelihood
         odds = -given.odds[k] if changed[k] else given.odds[k]
         score.append(float(odds + weighed.temper * gain))

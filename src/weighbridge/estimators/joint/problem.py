@@ -218,6 +218,41 @@ class FilterInput:
         by_row = ("time", "rows", "y", "noise", "added", "stood", "odds", "traction")
         return replace(self, **{name: getattr(self, name)[:count] for name in by_row})
 
+    def end(self) -> disturbance.DisturbanceState:
+        """State after the last window."""
+        return disturbance.run(  # type: ignore[no-any-return]
+            self.start, self.time, self.rows, self.y, self.noise, self.added, self.params
+        )[0]
+
+    def with_term(self, column: Floats, std: float) -> FilterInput:
+        """Return the same with a hypothesis: one more constant beside the mass, as the last state.
+
+        Its likelihood over that without, both of `end`, says how much speaks for it.
+
+        Parameters
+        ----------
+        column : (m,) traction that one unit of it takes [N]
+        std : of the constant before the drive has shown
+
+        References
+        ----------
+        A bias of known shape as a further state: Friedland, IEEE Trans. Automatic Control 14, 1969.
+        """
+        count = self.start.x.size
+        cov = np.zeros((count + 1, count + 1))
+        cov[:count, :count], cov[count, count] = self.start.cov, std**2
+        nothing = np.zeros_like(column)
+        return replace(
+            self,
+            start=self.start._replace(x=np.append(self.start.x, 0.0), cov=cov),
+            params=self.params._replace(
+                time_constant=np.append(self.params.time_constant, np.inf),
+                std=np.append(self.params.std, 0.0),
+            ),
+            rows=np.column_stack([self.rows, column]),
+            added=np.column_stack([self.added, nothing]),
+        )
+
     def weight(self) -> float:
         """Sum of the weights of all windows, each given those before it [1/N^2]."""
         return float(
