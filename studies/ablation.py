@@ -229,7 +229,8 @@ def _parts() -> dict[str, Part]:
     """List all parts by ``room.function``: those of `NAMED`, and each check of a drive."""
     from weighbridge import checks
 
-    listed = [Part(f.__module__, f.__name__, _nothing) for f in checks._CHECKS]
+    found = (check.find for check in checks.CHECKS.values())
+    listed = [Part(f.__module__, f.__name__, _nothing) for f in found]
     for neutral, modules in NAMED:
         for module, names in modules.items():
             listed += [Part(f"weighbridge.{module}", name, neutral) for name in names.split()]
@@ -302,12 +303,17 @@ def _wrapped(key: str, part: Part, f: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def install() -> None:
-    """Put a switch around each part, wherever a module has its name."""
+    """Put a switch around each part, wherever a module or the table of checks has it."""
+    from weighbridge.checks import CHECKS
+
     _load_all()
     modules = [m for n, m in list(sys.modules.items()) if n.startswith("weighbridge") and m]
     for key, part in _parts().items():
         f = getattr(sys.modules[part.module], part.name)
         wrapped = _wrapped(key, part, f)
+        for name, check in CHECKS._own.items():
+            if check.find is f:
+                CHECKS._own[name] = dataclasses.replace(check, find=wrapped)
         for module in modules:
             for name, value in list(vars(module).items()):
                 if value is f:

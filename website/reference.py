@@ -66,6 +66,7 @@ RECIPES = (
     "weighbridge.vehicle.torque_sources.ROUGH",
     "weighbridge.estimators.regression.regression",
     "weighbridge.estimators.joint.terms.Term",
+    "weighbridge.checks.Check",
     "weighbridge.estimators.gate.GateSettings",
     "weighbridge.estimators.judging.Evidence",
     "weighbridge.estimators.judging.judge",

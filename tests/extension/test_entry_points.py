@@ -1,4 +1,4 @@
-"""Torque source, vehicle class, estimator and term of another package, from drive to mass."""
+"""What another package adds to a weighing: torque source, class, estimator, term and check."""
 
 from dataclasses import replace
 
@@ -8,6 +8,7 @@ from tests.recipes import code, entry_points
 
 import weighbridge as wb
 from weighbridge import ConfigError
+from weighbridge.checks import CHECKS, check_drive
 from weighbridge.estimators import ESTIMATORS
 from weighbridge.estimators.joint.terms import TERMS
 from weighbridge.signals import Signal
@@ -16,6 +17,7 @@ from weighbridge.vehicle import TORQUE_SOURCES, VEHICLE_CLASSES
 
 FILES = {
     "fuel_source": code("fuel_source.py"),
+    "heat_check": code("heat_check.py"),
     "rickshaw_class": code("rickshaw_class.py"),
     "median_estimator": code("median_estimator.py"),
     "mud_term": code("mud_term.py"),
@@ -23,12 +25,12 @@ FILES = {
 TRIED_ELSEWHERE = {"weighbridge.formats", "weighbridge.sources"}
 POINTS = {group: line for group, line in entry_points().items() if group not in TRIED_ELSEWHERE}
 
-TABLES = (TORQUE_SOURCES, VEHICLE_CLASSES, ESTIMATORS, TERMS)
+TABLES = (TORQUE_SOURCES, VEHICLE_CLASSES, ESTIMATORS, TERMS, CHECKS)
 
 
 @pytest.fixture
 def package(tmp_path, monkeypatch):
-    """Install a distribution: four modules, one line each."""
+    """Install a distribution: five modules, one line each."""
     for name, text in FILES.items():
         (tmp_path / f"{name}.py").write_text(text)
     info = tmp_path / "weighbridge_more-1.0.dist-info"
@@ -105,9 +107,20 @@ def test_a_package_adds_a_term(package, tmp_path):
     assert "Drag of mud" in (tmp_path / "report.html").read_text(encoding="utf-8")
 
 
+def test_a_package_adds_a_check(package):
+    made = drive("car-short", 0.0, 905).drive
+    time = np.arange(made.start, made.end, 5.0)
+    hot = 363.15 + 40.0 * ((time > time[10]) & (time < time[20]))
+    warm = made.with_signals(Signal("coolant_temperature", time, hot))
+    (found,) = [p for p in check_drive(warm) if p.id == "engine.hot"]
+    assert (found.start, found.end) == pytest.approx((time[11], time[19]))
+    assert "engine.hot" not in {p.id for p in check_drive(made)}
+
+
 def test_without_the_package_the_names_are_unknown():
     with pytest.raises(ConfigError, match=r"class must be .*, van, bus or truck, got 'rickshaw'"):
         wb.Vehicle(kind="rickshaw")
     with pytest.raises(ConfigError, match="source must be measured"):
         wb.CalibrationSettings(source="fuel")
     assert "median" not in ESTIMATORS
+    assert "heat" not in CHECKS

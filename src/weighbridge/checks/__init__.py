@@ -8,7 +8,7 @@ can show never counts as serious.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Final
 
 from weighbridge.checks.clocks import (
@@ -38,35 +38,56 @@ from weighbridge.checks.values import check_load, check_retarder, check_stuck
 from weighbridge.checks.vehicle import check_vehicle
 from weighbridge.navigation.along import with_forward_accel
 from weighbridge.navigation.clock_drift import correct_clocks
+from weighbridge.registry import Registry
 from weighbridge.signals import Drive, Problem, longest_part
 from weighbridge.signals.catalogue import REPORTED_LOAD
 from weighbridge.signals.held import without_repeats
 from weighbridge.signals.timeline import one_recording, well_formed
 from weighbridge.vehicle import Vehicle
 
-__all__ = ["check_drive", "correct_drive", "refuse_serious"]
+__all__ = ["CHECKS", "Check", "check_drive", "correct_drive", "refuse_serious"]
 
-_Check = Callable[[Drive, "Vehicle | None"], Iterable[Problem]]
 
-_CHECKS: Final[tuple[_Check, ...]] = (
-    check_stuck,
-    check_frozen,
-    check_limit,
-    check_needed,
-    check_load,
-    check_retarder,
-    check_torque_sign,
-    check_friction,
-    check_engine_speed,
-    check_idle,
-    check_standstill,
-    check_scales,
-    check_imu,
-    check_range,
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Check:
+    """Something that a drive may show of its data.
+
+    Attributes
+    ----------
+    name : of the check
+    find : of a drive and its vehicle, None where that is unknown; returns what was found. A serious
+        problem withholds the mass
+    cleaned : it looks at what is left, without frozen values, dropouts and false samples
+    """
+
+    name: str
+    find: Callable[[Drive, Vehicle | None], Iterable[Problem]]
+    cleaned: bool = False
+
+
+CHECKS: Final = Registry(
+    Check,
+    "weighbridge.checks",
+    (
+        Check(name="stuck", find=check_stuck),
+        Check(name="frozen", find=check_frozen),
+        Check(name="limit", find=check_limit),
+        Check(name="needed", find=check_needed),
+        Check(name="load", find=check_load),
+        Check(name="retarder", find=check_retarder),
+        Check(name="torque_sign", find=check_torque_sign),
+        Check(name="friction", find=check_friction),
+        Check(name="engine_speed", find=check_engine_speed),
+        Check(name="idle", find=check_idle),
+        Check(name="standstill", find=check_standstill),
+        Check(name="scales", find=check_scales),
+        Check(name="imu", find=check_imu),
+        Check(name="range", find=check_range),
+        Check(name="vehicle", find=check_vehicle, cleaned=True),
+        Check(name="reading", find=check_reading, cleaned=True),
+    ),
 )
-
-_LAST: Final[tuple[_Check, ...]] = (check_vehicle, check_reading)
-"""They compare what is left, without frozen values and dropouts."""
+"""Every check by its name, in the order they are made."""
 
 
 def correct_drive(drive: Drive, vehicle: Vehicle | None = None) -> Drive:
@@ -115,21 +136,21 @@ def _corrected(drive: Drive, vehicle: Vehicle | None) -> Drive:
         drive = without_smoothed(correct_clocks(drive), vehicle)
     problems = [*drive.problems[len(earlier) :], *found]
     if not any(p.serious for p in problems):
-        problems += _found(_CHECKS, drive, vehicle)
+        problems += _found(drive, vehicle, cleaned=False)
     problems.sort(key=lambda p: not p.serious)
     clean = replace(within_ranges(drive), problems=(*earlier, *problems))
     if any(p.serious for p in problems):
         return clean
     clean = with_forward_accel(corrected(clean, vehicle))
-    problems = [*clean.problems[len(earlier) :], *_found(_LAST, clean, vehicle)]
+    problems = [*clean.problems[len(earlier) :], *_found(clean, vehicle, cleaned=True)]
     problems.sort(key=lambda p: not p.serious)
     return replace(clean, problems=(*earlier, *problems))
 
 
-def _found(checks: tuple[_Check, ...], drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
+def _found(drive: Drive, vehicle: Vehicle | None, *, cleaned: bool) -> Iterator[Problem]:
     """What checks find; never serious of a signal that a person vouches for."""
-    for check in checks:
-        for p in check(drive, vehicle):
+    for check in CHECKS.values():
+        for p in check.find(drive, vehicle) if check.cleaned == cleaned else ():
             yield replace(p, serious=False) if p.signal in drive.info.trusted else p
 
 
