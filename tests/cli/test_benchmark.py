@@ -149,7 +149,7 @@ def test_methods_weigh_for_themselves_whatever_joint_finds(
 
     drives = pl.read_csv(bench / "drives.csv")
     drives.tail(1).write_csv(bench / "drives.csv")
-    monkeypatch.setattr("weighbridge.pipeline.weighing.contradicted", contradicted)
+    monkeypatch.setattr("weighbridge.pipeline.hypotheses.contradicted", contradicted)
     rows = {}
     for method in ("rls", "holm-ekf"):
         results = tmp_path / f"{method}.csv"

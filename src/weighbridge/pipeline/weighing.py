@@ -6,36 +6,25 @@ import logging
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from weighbridge.arguments import check_flag, check_path, check_text, check_type, suggestion
-from weighbridge.balance import ForceBalance, force_balance, height_scale, shaken
-from weighbridge.balance.bandwidth import LONGEST_PERIOD, smoothed_torque
+from weighbridge.balance import ForceBalance, force_balance
 from weighbridge.balance.charge import in_this_air
 from weighbridge.balance.circumference import on_its_tyres
 from weighbridge.balance.delay import (
-    added_lag,
     clock_shift,
     estimate_torque_delay,
 )
-from weighbridge.balance.gear_fit import ENOUGH, ratio_apart, share_on_gears
-from weighbridge.balance.gear_scale import scale_contradiction
-from weighbridge.balance.hybrid import motor_helps
 from weighbridge.balance.speed_balance import speed_balance
 from weighbridge.balance.torque_drift import smoothed_steps
 from weighbridge.errors import ConfigError, DriveError, WeighbridgeError
-from weighbridge.estimators import ESTIMATORS, MassTrack, Status, contradicted, differences, joint
-from weighbridge.estimators.gate import GATE
-from weighbridge.estimators.joint.bend import bent
-from weighbridge.estimators.joint.changing import largest
-from weighbridge.estimators.joint.foreign import of_another
-from weighbridge.estimators.joint.slow_errors import motion_variance, with_variance
+from weighbridge.estimators import ESTIMATORS, MassTrack, Status, differences
 from weighbridge.estimators.judging import lacks_accelerometer
 from weighbridge.estimators.squat import of_vehicle
 from weighbridge.messages import Problem, phrase, refused
-from weighbridge.navigation import BY_SPEED, Motion, identify_motion, without_accelerometer
+from weighbridge.navigation import Motion, identify_motion, without_accelerometer
 from weighbridge.pipeline.given import (
     GivenDrive,
     GivenVehicle,
@@ -44,8 +33,8 @@ from weighbridge.pipeline.given import (
     home_of,
     mapping_of,
 )
+from weighbridge.pipeline.hypotheses import Case, refused_by_balance, weighed_against
 from weighbridge.pipeline.notes import (
-    UNBACKED_STD,
     below_tare,
     beside_speed,
     beyond_class,
@@ -61,9 +50,8 @@ from weighbridge.pipeline.notes import (
 )
 from weighbridge.results.weighing import MassResult
 from weighbridge.signals import Drive
-from weighbridge.vehicle import Vehicle, by_power, source_of
+from weighbridge.vehicle import Vehicle, by_power
 from weighbridge.vehicle.as_read import as_read
-from weighbridge.vehicle.torque import source_signal
 
 if TYPE_CHECKING:
     from weighbridge.io.mapping import MappingSource
@@ -77,19 +65,6 @@ DEFAULT_METHOD = "joint"
 CLOCKS_APART = 0.6
 """Torque later by so much than in the calibration is another clock [s]: in simulated drives of one
 vehicle it differed by less than 0.1 s, and masses are 8 to 12 % light at 1 s."""
-
-ALTERED: Final = ("torque.steps_filtered",)
-"""Findings that the torque's reading was altered after it was sent."""
-
-ALTERED_STD: Final = 0.05
-"""What that leaves uncertain of a mass, relative [-]: five such readings (scaled from mid-drive
-on, or bent by a power of 1.2) were 3 to 6 % off, and the check found none of 300 undamaged
-drives."""
-
-ALTERED_RARELY_STD: Final = 0.13
-"""The same of a torque that comes too rarely to show quick changes, relative [-]: one that is
-smoothed by 1 s may pass. Of 60 such drives of fifteen vehicles with a torque once a second, the 45
-that were weighed were 13 % too light in the mean, 15 % RMS."""
 
 ONE_TABLE: Final = 0.4
 """Lateness of speed and torque that differs by less is that of their table [s]: speeds are late by
@@ -297,51 +272,17 @@ def weigh_balance(
     if not estimator.speed_alone:
         problems += uncalibrated(vehicle, result)
     status, reason = result.status, result.reason
-    share = None if estimator.speed_alone else share_on_gears(balance, vehicle)
-    if share is not None and share < ENOUGH:
-        status = Status.INCONSISTENT
-        seen, expected = ratio_apart(balance, vehicle)
-        reason = Problem.of(
-            "gear.foreign",
-            share=100.0 * share,
-            vehicle=vehicle.name,
-            seen=seen,
-            expected=expected,
-        )
-    elif not estimator.speed_alone and (
-        why := motor_helps(drive, balance, vehicle)
-        or scale_contradiction(balance, vehicle)
-        or shaken(drive, balance.motion)
-        or _height_scale(drive, balance, vehicle)
-        or _smoothed(drive, vehicle, result)
-    ):
+    case = Case(
+        drive=drive, vehicle=vehicle, balance=balance, track=result, problems=problems,
+        joined=result if result.filter_input is not None else joined,
+    )  # fmt: skip
+    if not estimator.speed_alone and (why := refused_by_balance(case)):
         status, reason = Status.INCONSISTENT, why
-    if status is Status.CONVERGED and not estimator.speed_alone:
-        if result.filter_input is not None:
-            joined = result
-        joined = joined or joint.estimate(balance, vehicle)
-        refused, doubt = of_another(vehicle, joined)
-        change = largest(joined.filter_input) if joined.filter_input is not None else None
-        if change is not None and change.sure:
-            status, reason = Status.INCONSISTENT, change.refusal(balance.motion.source)
-        elif refused:
-            status, reason = Status.INCONSISTENT, doubt
-        elif why := bent(joined.bend, drive, vehicle) or contradicted(result, joined):
+    elif status is Status.CONVERGED and not estimator.speed_alone:
+        result, why, doubts = weighed_against(case)
+        problems += doubts
+        if why is not None:
             status, reason = Status.INCONSISTENT, why
-        else:
-            possible = result.possible_change
-            result = result.doubted(
-                math.hypot(
-                    change.doubt_std if change is not None else 0.0,
-                    _altered_std(drive, vehicle, problems),
-                    UNBACKED_STD if unbacked(vehicle) else 0.0,
-                )
-            )
-            doubts = [change.doubt if change is not None else None]
-            if doubts[0] is not None and result.std > GATE.widest * result.mass:
-                status, reason = Status.INCONSISTENT, doubts.pop(0)
-            doubts += [doubt, possible.note if possible is not None else None]
-            problems += tuple(d for d in doubts if d is not None)
     if status is Status.CONVERGED:
         problems += towing(drive, result)
     return Weighing(
@@ -360,57 +301,6 @@ def weigh_balance(
         ),
         settings=settings,
     )
-
-
-def _height_scale(drive: Drive, balance: ForceBalance, vehicle: Vehicle) -> Problem | None:
-    """Say that heights or grades are in another unit, unless a person vouches for them."""
-    signal = "grade" if drive.has("grade") else "altitude"
-    if signal in drive.info.trusted:
-        return None
-    return height_scale(balance, vehicle, signal, drive.units.get(signal))
-
-
-def _smoothed(drive: Drive, vehicle: Vehicle, track: MassTrack) -> Problem | None:
-    """Say that the torque was smoothed, unless a person vouches for it."""
-    if set(source_of(vehicle).found(drive)) & set(drive.info.trusted):
-        return None
-    balance, found, motion = track.balance, track.switched, track.balance.motion
-    if motion.source in BY_SPEED and track.status is not Status.CONVERGED:
-        # A calm drive has no quick changes.
-        return None
-    if track.sizes is not None:
-        motion = with_variance(motion, track.sizes.motion_var)
-    quick = smoothed_torque(
-        balance,
-        vehicle,
-        beside=0.0 if found is None else found.force(balance.table, vehicle),
-        noise=partial(motion_variance, motion),
-    )
-    return quick or _slower(drive, vehicle, balance)
-
-
-def _slower(drive: Drive, vehicle: Vehicle, balance: ForceBalance) -> Problem | None:
-    """Say that the torque follows more slowly than in the calibration; None if not.
-
-    That is for a torque that comes too rarely to show quick changes.
-    """
-    known = vehicle.provenance.torque_fitted and vehicle.timing.torque_delay is not None
-    if not known or balance.setup is None or not _rarely(drive, vehicle):
-        return None
-    added, source = added_lag(drive, vehicle, balance), source_of(vehicle).name
-    return Problem.of("torque.slower", added=added, source=source) if added else None
-
-
-def _rarely(drive: Drive, vehicle: Vehicle) -> bool:
-    """Whether the torque comes too rarely to show quick changes."""
-    return source_signal(drive, vehicle).period > LONGEST_PERIOD
-
-
-def _altered_std(drive: Drive, vehicle: Vehicle, problems: tuple[Problem, ...]) -> float:
-    """What a torque that was altered after it was sent leaves uncertain of a mass, relative [-]."""
-    if not any(p.id in ALTERED for p in problems):
-        return 0.0
-    return ALTERED_RARELY_STD if _rarely(drive, vehicle) else ALTERED_STD
 
 
 def without_mass(
