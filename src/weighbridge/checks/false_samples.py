@@ -122,24 +122,22 @@ def piled(signal: Signal, *, lowest: bool = False) -> Bools:
     -------
     (n,) all False where the reading ends by itself
     """
-    values = -signal.values if lowest else signal.values
-    nothing = np.zeros(values.size, dtype=bool)
-    if values.size < 200:
-        return nothing
-    end = float(values.max())
-    if QUANTITIES[signal.name].suffix == "pct" and FULL_LOAD[0] <= end <= FULL_LOAD[1]:
-        return nothing
+    values = signal.values
+    end = float((values.min if lowest else values.max)()) if values.size else 0.0
     at_end = values == end
-    span = end - float(np.percentile(values, 5.0))
-    others = values[~at_end]
-    # Of a coarse reading, at least its next step.
-    beside = np.count_nonzero(others >= min(end - BESIDE * span, others.max(initial=-np.inf)))
     count = np.count_nonzero(at_end)
+    nothing = np.zeros(values.size, dtype=bool)
+    if values.size < 200 or count < MUCH * values.size:
+        return nothing
+    if QUANTITIES[signal.name].suffix == "pct" and FULL_LOAD[0] <= abs(end) <= FULL_LOAD[1]:
+        return nothing
+    from_end = np.abs(values - end)
+    span, others = float(np.percentile(from_end, 95.0)), from_end[~at_end]
+    # Of a coarse reading, at least its next step.
+    beside = np.count_nonzero(others <= max(BESIDE * span, others.min(initial=np.inf)))
     runs = runs_of(signal)
     often = np.count_nonzero((values[runs.first] == end) & (runs.length > 1))
-    if count < MUCH * values.size or count < beside or often < FEWEST_SAMPLES:
-        return nothing
-    return np.asarray(at_end)
+    return at_end if count >= beside and often >= FEWEST_SAMPLES else nothing
 
 
 _OFTEN: Final = 3
