@@ -73,7 +73,10 @@ def test_words_with_commas_are_a_list():
     given = parsed(["terms=mass, drag_area,disturbance"])
     assert given == {"terms": ["mass", "drag_area", "disturbance"]}
     assert ESTIMATORS["joint"].settings_of(given).terms == ("mass", "drag_area", "disturbance")
-    assert ESTIMATORS["joint"].settings_of(parsed(["terms=mass"])).terms == ("mass",)
+    few = ESTIMATORS["joint"].settings_of(parsed(["terms=mass"]))
+    assert few.terms == ("mass",)
+    given = ESTIMATORS["joint"].settings_of({"terms": ["mass", "disturbance"]})
+    assert differences(given) == "terms = mass,disturbance"
 
 
 @pytest.mark.parametrize("text", ["forgetting", "=1", "gate=", "gate=5;0", "gate=1\nmass=2"])

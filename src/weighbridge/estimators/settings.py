@@ -42,7 +42,13 @@ def changed(settings: Any, given: Mapping[str, object]) -> Any:
 def differences(settings: Any) -> str:
     """Name what differs from the defaults: ``forgetting = 0.999``; empty where nothing does."""
     usual = _values(type(settings)())
-    return ", ".join(f"{k} = {v}" for k, v in _values(settings).items() if v != usual[k])
+    changed = {k: v for k, v in _values(settings).items() if v != usual[k]}
+    return ", ".join(f"{k} = {_written(v)}" for k, v in changed.items())
+
+
+def _written(value: Any) -> str:
+    """Write a value as a command has it."""
+    return ",".join(map(str, value)) if isinstance(value, tuple) else str(value)
 
 
 def parsed(texts: Sequence[str]) -> dict[str, object]:

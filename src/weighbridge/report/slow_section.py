@@ -216,7 +216,7 @@ def further_panels(weighing: MassResult, slow: SlowErrors) -> tuple[Panel, ...]:
         Panel(
             title=f"{term.title[:1].upper()}{term.title[1:]}",
             caption="The band is of 95 %.",
-            figure=band_over_time(weighing, found, f"{term.title} [{shown_unit(term.unit)}]"),
+            figure=band_over_time(weighing, found, f"{name} [{shown_unit(term.unit)}]"),
         )
         for name, found in slow.found.items()
         for term in [TERMS[name]]
