@@ -15,15 +15,8 @@ MOST: Final = 200
 SLOPE: Final = 1e-4
 """By which a number is moved to find the slope of a smooth function."""
 
-BEND: Final = 0.3
-"""By which a number is moved to both sides to find how the function bends at its start: about the
-standard deviation of the logarithm of a level."""
-
-FURTHER: Final = 4.0
-"""Where it falls more and more steeply a step is lengthened so many times [-]."""
-
-FLATTEST: Final = 1.0
-"""Where it bends less it counts as bent so much: as by a weak prior of a logarithm."""
+FIRST: Final = 0.5
+"""Length of the first step down its slope."""
 
 LONGEST: Final = 1.0
 """A longer step is shortened to this: the logarithm of a level is sought, not of another size."""
@@ -61,11 +54,9 @@ def lowest_by_slopes(
         return np.array([(misfit(x + by) - here) / SLOPE for by in SLOPE * unit])
 
     x, here = start, misfit(start)
-    sides = np.array([[misfit(x + by), misfit(x - by)] for by in BEND * unit])
-    down = (sides[:, 0] - sides[:, 1]) / (2.0 * BEND)
-    bends = (sides.sum(axis=1) - 2.0 * here) / BEND**2
-    inverse = np.diag(1.0 / np.maximum(bends, FLATTEST))
-    for _ in range(FEW):
+    down = slopes(x, here)
+    inverse = unit * FIRST / max(float(np.linalg.norm(down)), 1e-12)
+    for k in range(FEW):
         step = -inverse @ down
         step *= min(1.0, LONGEST / max(float(np.linalg.norm(step)), 1e-12))
         for _ in range(HALVED):
@@ -82,11 +73,10 @@ def lowest_by_slopes(
         turned = down - before
         curved = float(moved @ turned)
         if curved > 0.0:
+            if k == 0:
+                inverse = unit * curved / float(turned @ turned)
             keep = unit - np.outer(moved, turned) / curved
             inverse = keep @ inverse @ keep.T + np.outer(moved, moved) / curved
-        else:
-            # It falls ever more steeply: what is sought lies further.
-            inverse = FURTHER * inverse
         # A short step that was halved gains little as well, but more is to be gained.
         if max(gained, 0.5 * float(down @ inverse @ down)) < close:
             break
