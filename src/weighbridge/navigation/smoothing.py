@@ -14,6 +14,9 @@ from weighbridge.signals.minimum import lowest_by_slopes
 _Model = tuple[Floats, Floats, float, Floats, Floats]
 """Transitions, process covariances, noise variance, first state and its covariance."""
 
+_Models = Callable[[Floats], Callable[[Floats], _Model]]
+"""Of a clock (m,), then of logarithms of the sizes over the usual ones (levels,)."""
+
 ACCEL_TIME: Final = 3.0
 """How long a driver keeps an acceleration before the drive has shown [s]."""
 
@@ -69,7 +72,7 @@ def _merged(stamps: Floats, values: Floats, time: Floats) -> tuple[Floats, Float
 
 
 def _smooth_likeliest(
-    model: Callable[[Floats, Floats], _Model],
+    model: _Models,
     row: Floats,
     measured: tuple[Floats, Floats],
     time: Floats,
@@ -79,7 +82,7 @@ def _smooth_likeliest(
 
     Parameters
     ----------
-    model : of a clock (m,) and logarithms of the sizes over the usual ones (levels,)
+    model
     row : (k,) of the state that is measured
     measured : stamps [s] and values (j,)
     time : (n,) instants asked for, rising [s]
@@ -91,17 +94,18 @@ def _smooth_likeliest(
     """
     stamps, values = measured
     stride = _stride(stamps)
-    thin = stamps[::stride]
+    thin = np.ascontiguousarray(values[::stride])
+    of_thin = model(stamps[::stride])
 
     def misfit(level: Floats) -> float:
-        transition, cov, noise, start, spread = model(thin, level)
+        transition, cov, noise, start, spread = of_thin(level)
         var = np.full(thin.size, noise)
-        likelihood = rts.log_likelihood(transition, cov, row, values[::stride], var, start, spread)
+        likelihood = rts.log_likelihood(transition, cov, row, thin, var, start, spread)
         return float(-likelihood + 0.5 * np.sum((level / LEVEL_STD) ** 2))
 
     found = lowest_by_slopes(misfit, np.zeros(levels), close=_CLOSE, farthest=_FARTHEST)
     clock, z, at = _merged(stamps, values, time)
-    transition, cov, noise, start, spread = model(clock, found)
+    transition, cov, noise, start, spread = model(clock)(found)
     x, var = rts.smooth(transition, cov, row, z, np.full(clock.size, noise), start, spread)
     return x[at], var[at]
 
@@ -133,11 +137,15 @@ def smooth_speed(speed: Signal, time: Floats) -> tuple[Floats, Floats, Floats, F
     usual = np.log([ACCEL_STD, ACCEL_TIME, np.hypot(SPEED_NOISE, quantum / np.sqrt(12.0))])
     row = np.array([1.0, 0.0])
 
-    def model(clock: Floats, level: Floats) -> _Model:
-        std, length, noise = np.exp(usual + level)
-        transition, cov = rts.gauss_markov(np.diff(clock, prepend=clock[0]), length, std)
-        start = np.array([speed.values[0], 0.0])
-        return transition, cov, noise**2, start, np.diag([noise**2, std**2])
+    def model(clock: Floats) -> Callable[[Floats], _Model]:
+        step, start = np.diff(clock, prepend=clock[0]), np.array([speed.values[0], 0.0])
+
+        def of(level: Floats) -> _Model:
+            std, length, noise = np.exp(usual + level)
+            transition, cov = rts.gauss_markov(step, length, std)
+            return transition, cov, noise**2, start, np.diag([noise**2, std**2])
+
+        return of
 
     x, var = _smooth_likeliest(model, row, (speed.time, speed.values), time, 3)
     std = np.sqrt(np.maximum(var, 0.0))
@@ -176,16 +184,20 @@ def smooth_height(
     )  # fmt: skip
     row = np.array([1.0, 0.0, 1.0])
 
-    def model(clock: Floats, level: Floats) -> _Model:
-        std, length, noise, walk, lasting = np.exp(usual + level)
+    def model(clock: Floats) -> Callable[[Floats], _Model]:
         way = np.interp(clock, time, distance)
-        road, road_cov = rts.gauss_markov(np.diff(way, prepend=way[0]), length, std)
-        keep = np.exp(-np.diff(clock, prepend=clock[0]) / lasting)
-        transition, cov = np.zeros((clock.size, 3, 3)), np.zeros((clock.size, 3, 3))
-        transition[:, :2, :2], cov[:, :2, :2] = road, road_cov
-        transition[:, 2, 2], cov[:, 2, 2] = keep, walk**2 * (1.0 - keep**2)
+        road_step, step = np.diff(way, prepend=way[0]), np.diff(clock, prepend=clock[0])
         start = np.array([values[0], 0.0, 0.0])
-        return transition, cov, noise**2, start, np.diag([1e4, std**2, walk**2])
+
+        def of(level: Floats) -> _Model:
+            std, length, noise, walk, lasting = np.exp(usual + level)
+            keep = np.exp(-step / lasting)
+            transition, cov = np.zeros((clock.size, 3, 3)), np.zeros((clock.size, 3, 3))
+            transition[:, :2, :2], cov[:, :2, :2] = rts.gauss_markov(road_step, length, std)
+            transition[:, 2, 2], cov[:, 2, 2] = keep, walk**2 * (1.0 - keep**2)
+            return transition, cov, noise**2, start, np.diag([1e4, std**2, walk**2])
+
+        return of
 
     x, var = _smooth_likeliest(model, row, (stamps, values), time, 5)
     return x[:, 0], x[:, 1], np.sqrt(np.maximum(var[:, 1], 0.0))
@@ -212,11 +224,16 @@ def smooth_grade(measured: Signal, time: Floats, distance: Floats) -> tuple[Floa
     usual = np.log([GRADE_STD, GRADE_LENGTH, np.hypot(GRADE_NOISE, quantum / np.sqrt(12.0))])
     row = np.array([0.0, 1.0])
 
-    def model(clock: Floats, level: Floats) -> _Model:
-        std, length, noise = np.exp(usual + level)
+    def model(clock: Floats) -> Callable[[Floats], _Model]:
         way = np.interp(clock, time, distance)
-        transition, cov = rts.gauss_markov(np.diff(way, prepend=way[0]), length, std)
-        return transition, cov, noise**2, np.zeros(2), np.diag([0.0, std**2])
+        step = np.diff(way, prepend=way[0])
+
+        def of(level: Floats) -> _Model:
+            std, length, noise = np.exp(usual + level)
+            transition, cov = rts.gauss_markov(step, length, std)
+            return transition, cov, noise**2, np.zeros(2), np.diag([0.0, std**2])
+
+        return of
 
     stamps, values = measured.time, measured.values
     x, var = _smooth_likeliest(model, row, (stamps, values), time, 3)
