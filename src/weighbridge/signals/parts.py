@@ -207,6 +207,8 @@ def _speed_jumps(speed: Signal, witnesses: Sequence[Signal]) -> list[Cut]:
     """Find steps that no tyre could make since the value before was new, amid steady driving.
 
     A splice breaks every signal. Where others go on, the speed alone has changed, as its unit does.
+    So none of 19 pairs of the corpus whose unit changes is taken for a splice. The splices of 960
+    drives of six vehicles, joined at speed, are found as often as without.
 
     Over 92 hours of recorded and simulated drives, thinned to as little as a value in 2 s, and 795
     of them with values held, dropped or spiked, none was found. Of pairs of them put one behind the
