@@ -156,7 +156,10 @@ def smooth(transition, process_cov, row, z, variance, x0, cov0):
         if i > 0:
             _predict(transition, process_cov, i, x, cov, work)
         # What is kept is from before the row is measured.
-        mean[i], covs[i] = x, cov
+        for a in range(k):
+            mean[i, a] = x[a]
+            for b in range(k):
+                covs[i, a, b] = cov[a, b]
         if np.isfinite(z[i]):
             spreads[i] = _spread(cov, row, variance[i], gains[i])
             errors[i] = _error(row, x, z[i])
@@ -174,7 +177,8 @@ def smooth(transition, process_cov, row, z, variance, x0, cov0):
                 moved[a] = -row[a] * errors[i] / spreads[i]
                 for b in range(k):
                     moved[a] += keep[b, a] * adjoint[b]
-            adjoint[:] = moved
+            for a in range(k):
+                adjoint[a] = moved[a]
             _product(keep.T, information, work[0])
             _product(work[0], keep, information)
             for a in range(k):
@@ -192,7 +196,8 @@ def smooth(transition, process_cov, row, z, variance, x0, cov0):
             moved[a] = 0.0
             for b in range(k):
                 moved[a] += transition[i, b, a] * adjoint[b]
-        adjoint[:] = moved
+        for a in range(k):
+            adjoint[a] = moved[a]
         _product(transition[i].T, information, work[0])
         _product(work[0], transition[i], information)
     return mean, var

@@ -99,8 +99,8 @@ def step(state, time, row, y, noise_var, force, added, params):
     for i in range(2):
         held = disturbance.DisturbanceState(state.x[i], state.cov[i], state.time, state.rows, 0.0)
         held = disturbance.inflated(held, added, params.filter)
-        x, cov[i], _ = disturbance.faded(held, time, params.filter)
-        mean, var = disturbance.predicted(x, cov[i], row, noise_var, gain)
+        x, held_cov, _ = disturbance.faded(held, time, params.filter)
+        mean, var = disturbance.predicted(x, held_cov, row, noise_var, gain)
         on = from_on if i == 1 else from_off
         any_taken = False
         for j in range(2):
@@ -113,10 +113,9 @@ def step(state, time, row, y, noise_var, force, added, params):
             chance[i, j] = np.log(state.share[i] * turned) - 0.5 * (np.log(var) + seen * seen)
             for a in range(n):
                 moved[i, j, a] = x[a] + (gain[a] / var * error if taken else 0.0)
-        if any_taken:
-            for a in range(n):
-                for b in range(n):
-                    cov[i, a, b] -= gain[a] * gain[b] / var
+        for a in range(n):
+            for b in range(n):
+                cov[i, a, b] = held_cov[a, b] - (gain[a] * gain[b] / var if any_taken else 0.0)
     return _merged(state, time, held.rows + 1, moved, cov, chance)
 
 
