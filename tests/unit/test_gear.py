@@ -139,6 +139,14 @@ def test_a_motor_in_the_hub_is_a_gear():
     assert found.gearings == pytest.approx([1.0 / 0.345], rel=0.005)
 
 
+def test_too_slow_an_engine_speed_says_so():
+    time, engine, speed = drive(np.random.default_rng(5))
+    motion = SimpleNamespace(time=time, speed=speed, speed_delay=0.0)
+    slow = Signal("engine_speed", time[::20], engine[::20])
+    with refused("calibration.slow_engine_speed", period=pytest.approx(slow.period)):
+        find_gears([wb.Drive("d", {"engine_speed": slow})], [motion])
+
+
 def test_too_short_a_drive_says_so():
     time = np.arange(20) * 0.25
     with refused("gear.few_samples"):

@@ -41,6 +41,7 @@ from weighbridge.vehicle import (
     stepless_range,
 )
 from weighbridge.vehicle.as_read import as_read
+from weighbridge.vehicle.gear import BESIDE
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -289,12 +290,16 @@ def find_gears(
     Raises
     ------
     DriveError
-        No engine speed, or no ratio stands out.
+        No engine speed, one that is too slow, or no ratio stands out.
     """
     for drive in drives:
         signal = drive.get("engine_speed")
         if signal is None or len(signal) < 30:
             raise refused("calibration.no_engine_speed", drive=drive.name)
+        if signal.period >= BESIDE:
+            raise refused(
+                "calibration.slow_engine_speed", drive=drive.name, period=signal.period, most=BESIDE
+            )
     found = detect_gearings(*_aligned(drives, motions), idle_speed=idle_speed)
     found = detect_gearings(*_aligned(drives, motions, found.gearings), idle_speed=idle_speed)
     reported = _reported_gears(drives)

@@ -45,6 +45,9 @@ RATE_SPAN: Final = 0.2
 """The rate of an engine speed is looked at over so long before and after [s]: with 0.4 s the masses
 of six pairs of the corpus with a stepless gearbox change by 0.2 % at most."""
 
+BESIDE: Final = 3.0
+"""Samples of a ratio that are further apart do not show that it held still [s]."""
+
 REPORTED_NEAR: Final = 0.06
 """A gear reported belongs to the gearing its median ratio is this near to [-]."""
 
@@ -359,7 +362,7 @@ def steady(time: Floats, gearing: Floats, tolerance: Floats) -> Bools:
     """
     log = np.log(np.where(gearing > 0.0, gearing, np.nan))
     change = np.abs(np.diff(log))
-    near = np.isfinite(change) & (np.diff(time) < 3.0)
+    near = np.isfinite(change) & (np.diff(time) < BESIDE)
     agrees = near & (change < 0.5 * (tolerance[1:] + tolerance[:-1]))
     held = np.zeros(time.size, dtype=bool)
     held[1:-1] = agrees[1:] & agrees[:-1]
