@@ -189,7 +189,6 @@ NAMED: Final[tuple[tuple[Callable[..., Any], dict[str, str]], ...]] = (
         "navigation.longitudinal": "_lateness",
         "calibration.uncertain_motion": "gain_std",
         "vehicle.power_balance": "_lateness",
-        "pipeline.weighing": "_other_clock",
     }),
     (_false, {
         "checks.false_samples": "isolated piled clipped",

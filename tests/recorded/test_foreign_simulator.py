@@ -8,7 +8,7 @@ import pytest
 from numba import config
 
 import weighbridge as wb
-from weighbridge.pipeline.weighing import torque_balance
+from weighbridge.pipeline.setup import identify
 
 pytestmark = pytest.mark.skipif(
     bool(config.DISABLE_JIT), reason="whole drives take minutes without the compiler"
@@ -65,9 +65,8 @@ def test_differences_of_load_are_what_they_are(foreign_simulator, calibrated, ve
 
 @pytest.mark.parametrize("vehicle", VEHICLES)
 def test_next_to_no_row_that_weighs_is_braked(foreign_simulator, calibrated, vehicle):
-    balance, _ = torque_balance(
-        wb.read_drive(foreign_simulator / vehicle / "drive-3"), calibrated(vehicle, THREE[:1])
-    )
+    drive = wb.read_drive(foreign_simulator / vehicle / "drive-3")
+    balance = identify(drive, calibrated(vehicle, THREE[:1])).balance
     known = truth(foreign_simulator, vehicle, "drive-3")
     table = balance.table
     brake = np.interp(table.time, known["time_s"], known["brake_n"])

@@ -11,7 +11,7 @@ from weighbridge.constants import GRAVITY
 from weighbridge.estimators import ESTIMATORS
 from weighbridge.kernels import multiple_forgetting
 from weighbridge.papers.jensen2022_drives import without_weather
-from weighbridge.pipeline.weighing import torque_balance
+from weighbridge.pipeline.setup import identify
 from weighbridge.simulation import (
     DIESEL_AUTOMATIC,
     TRUCK18,
@@ -73,7 +73,7 @@ def driven(car, mass, seed, *, every, polling):
         duration=300.0,
     )
     made, car = simulate_car(scenario), known(car)
-    return torque_balance(without_weather(made.drive), car)[0], car
+    return identify(without_weather(made.drive), car).balance, car
 
 
 @pytest.fixture(scope="module")

@@ -10,21 +10,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from weighbridge.arguments import check_flag, check_path, check_text, check_type, suggestion
-from weighbridge.balance import ForceBalance, force_balance
-from weighbridge.balance.charge import in_this_air
-from weighbridge.balance.circumference import on_its_tyres
-from weighbridge.balance.delay import (
-    clock_shift,
-    estimate_torque_delay,
-)
+from weighbridge.balance import ForceBalance
 from weighbridge.balance.speed_balance import speed_balance
-from weighbridge.balance.torque_drift import smoothed_steps
 from weighbridge.errors import ConfigError, DriveError, WeighbridgeError
 from weighbridge.estimators import ESTIMATORS, MassTrack, Status, differences
-from weighbridge.estimators.judging import lacks_accelerometer
-from weighbridge.estimators.squat import of_vehicle
-from weighbridge.messages import Problem, phrase, refused
-from weighbridge.navigation import Motion, identify_motion, without_accelerometer
+from weighbridge.messages import Problem
+from weighbridge.navigation import without_accelerometer
 from weighbridge.pipeline.given import (
     GivenDrive,
     GivenVehicle,
@@ -41,16 +32,16 @@ from weighbridge.pipeline.notes import (
     fitted_for_another,
     lighter_than_known,
     no_speed,
-    other_equipment,
     overload,
     towing,
     unbacked,
     uncalibrated,
     what_is_missing,
 )
+from weighbridge.pipeline.setup import identify
 from weighbridge.results.weighing import MassResult
 from weighbridge.signals import Drive
-from weighbridge.vehicle import Vehicle, by_power
+from weighbridge.vehicle import Vehicle
 from weighbridge.vehicle.as_read import as_read
 
 if TYPE_CHECKING:
@@ -60,15 +51,6 @@ _LOG = logging.getLogger(__name__)
 
 DEFAULT_METHOD = "joint"
 """Estimator used unless one is named."""
-
-
-CLOCKS_APART = 0.6
-"""Torque later by so much than in the calibration is another clock [s]: in simulated drives of one
-vehicle it differed by less than 0.1 s, and masses are 8 to 12 % light at 1 s."""
-
-ONE_TABLE: Final = 0.4
-"""Lateness of speed and torque that differs by less is that of their table [s]: speeds are late by
-0 to 0.4 s where their clock is right."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
@@ -235,13 +217,9 @@ def _weigh_all(drive: Drive, vehicle: Vehicle, method: str, settings: Any) -> We
         balance = speed_balance(drive, vehicle)
         problems += balance.motion.notes + beside_speed(drive)
     else:
-        vehicle, found = by_power(seen, in_this_air(seen, vehicle))
-        balance, notes = torque_balance(seen, vehicle)
-        vehicle, tyres = on_its_tyres(balance, vehicle)
-        if tyres is not None:
-            balance, notes = torque_balance(seen, vehicle)
-            notes = (tyres, *notes)
-        problems += found + notes + vehicle.provenance.problems
+        setup = identify(seen, vehicle)
+        vehicle, balance = setup.vehicle, setup.balance
+        problems += setup.notes + vehicle.provenance.problems
         problems += fitted_for_another(vehicle, method) + unbacked(vehicle)
     return weigh_balance(drive, vehicle, method, balance, problems, settings=settings)
 
@@ -376,63 +354,3 @@ def _another_balance(weighing: Weighing, method: str) -> bool:
         return False
     drive = weighing.drive
     return len(without_accelerometer(drive).signals) < len(drive.signals)
-
-
-def torque_balance(drive: Drive, vehicle: Vehicle) -> tuple[ForceBalance, tuple[Problem, ...]]:
-    """Balance measured or modelled torque against the best motion the drive allows.
-
-    Returns
-    -------
-    balance
-    notes : what was found and what is uncertain
-
-    Raises
-    ------
-    DriveError
-        Torque and motion are on clocks that differ.
-    """
-    found, navigation = identify_motion(drive, vehicle)
-    motion = of_vehicle(found, vehicle)
-    delay = vehicle.timing.torque_delay
-    balance = force_balance(drive, vehicle, motion, delay=delay or 0.0)
-    drive, drifted, balance = smoothed_steps(drive, vehicle, balance)
-    notes = motion.notes + drifted
-    if delay is None:
-        delay = estimate_torque_delay(drive, vehicle, motion, balance)
-        if math.isfinite(delay):
-            notes += (Problem.of("torque.delay_found", delay=delay),)
-        else:
-            delay = 0.0
-            notes += (Problem.of("torque.delay_unknown"),)
-    elif vehicle.provenance.torque_fitted:
-        later = _other_clock(drive, vehicle, motion, balance)
-        if later:
-            delay += later
-            # Against a speed alone, which is late itself, the torque's clock is another one.
-            if not lacks_accelerometer(vehicle, motion):
-                notes += (Problem.of("torque.clock_moved", later=_later(later), by=later),)
-    if balance.delay != delay:
-        balance = force_balance(drive, vehicle, motion, delay=delay)
-    balance = replace(balance, navigation=navigation)
-    return balance, notes + other_equipment(vehicle, balance) + balance.notes
-
-
-def _other_clock(drive: Drive, vehicle: Vehicle, motion: Motion, balance: ForceBalance) -> float:
-    """By how much the torque of a drive is later than in the calibration [s]; 0 where it is not.
-
-    Raises
-    ------
-    DriveError
-        The clocks of torque and motion are `CLOCKS_APART` or more off, and not those of speed
-        and motion by as much.
-    """
-    later = clock_shift(drive, vehicle, motion, balance)
-    # As late as the speed beside it: the whole table is, and the shift brings all of it back.
-    of_table = motion.speed_delay > CLOCKS_APART and abs(motion.speed_delay - later) < ONE_TABLE
-    if abs(later) > CLOCKS_APART and not of_table:
-        raise refused("clock.torque_apart", drive=drive.name, later=_later(later), by=later)
-    return later
-
-
-def _later(by: float) -> str:
-    return phrase("later" if by > 0.0 else "earlier", by=abs(by))
