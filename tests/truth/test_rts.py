@@ -39,10 +39,30 @@ def dense(transition, process_cov, row, z, variance, x0, cov0):
     )  # fmt: skip
 
 
-def test_smoother_and_likelihood_equal_the_dense_ones():
+def test_the_smoother_equals_the_dense_one():
     made = model(np.random.default_rng(1))
-    mean, var, told = dense(*made)
+    mean, var, _ = dense(*made)
     x, found_var = rts.smooth(*made)
     assert_allclose(x, mean, rtol=1e-9, atol=1e-12)
     assert_allclose(found_var, var, rtol=1e-9, atol=1e-12)
-    assert_allclose(rts.log_likelihood(*made), told, rtol=1e-9)
+
+
+def test_the_likelihood_of_a_process_equals_the_dense_one():
+    rng = np.random.default_rng(2)
+    step, span = rng.uniform(0.0, 8.0, (2, 300)) * rng.choice([1e-3, 1.0], 300)
+    z = 5.0 + 40.0 * rng.normal(size=300)
+    z[[3, 70]] = np.nan
+    std, length, noise, walk, lasting = sizes = (0.5, 3.0, 0.2, 2.0, 9.0)
+    transition, cov = np.zeros((2, 300, 3, 3))
+    transition[:, :2, :2], cov[:, :2, :2] = rts.gauss_markov(step, length, std)
+    keep = np.exp(-span / lasting)
+    transition[:, 2, 2], cov[:, 2, 2] = keep, walk**2 * (1.0 - keep**2)
+    for row, used in (([1.0, 0.0, 1.0], 3), ([1.0, 0.0, 0.0], 2), ([0.0, 1.0, 0.0], 2)):
+        size = sizes if used == 3 else (*sizes[:3], 0.0, 1.0)
+        told = dense(
+            transition[:, :used, :used], cov[:, :used, :used], np.array(row[:used]), z,
+            np.full(300, noise**2), np.array([5.0, 0.0, 0.0][:used]),
+            np.diag([7.0, std**2, walk**2][:used]),
+        )[2]  # fmt: skip
+        found = rts.log_likelihood(step, span, np.array(row), z, size, 5.0, 7.0)
+        assert_allclose(found, told, rtol=1e-8)

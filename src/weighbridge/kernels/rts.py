@@ -72,6 +72,22 @@ def _update(x, cov, gain, error, spread):
             cov[i, j] -= gain[i] * gain[j] * inverse
 
 
+@inlined_kernel
+def _integrated(x):
+    """What is left of a first-order Gauss-Markov process after ``x`` of its lengths.
+
+    Beside it the part of its first value, and of its variance, that comes to the integral, in units
+    of the length and of its square.
+    """
+    keep = np.exp(-x)
+    # In short steps the difference loses its digits: there it is its series.
+    if x < 1e-2:
+        integral = 2.0 / 3.0 * x**3 * (1.0 - 0.75 * x)
+    else:
+        integral = 2.0 * x - 3.0 + 4.0 * keep - keep**2
+    return keep, 1.0 - keep, integral
+
+
 @kernel
 def gauss_markov(step, length, std):
     """Integrate a first-order Gauss-Markov process over steps.
@@ -88,25 +104,85 @@ def gauss_markov(step, length, std):
     n = step.size
     transition, cov = np.zeros((n, 2, 2)), np.empty((n, 2, 2))
     for i in range(n):
-        x = step[i] / length
-        keep = np.exp(-x)
+        keep, moves, integral = _integrated(step[i] / length)
         transition[i, 0, 0] = 1.0
-        transition[i, 0, 1] = length * (1.0 - keep)
+        transition[i, 0, 1] = length * moves
         transition[i, 1, 1] = keep
-        # In short steps the difference loses its digits: there it is its series.
-        if x < 1e-2:
-            integral = 2.0 / 3.0 * x**3 * (1.0 - 0.75 * x)
-        else:
-            integral = 2.0 * x - 3.0 + 4.0 * keep - keep**2
         cov[i, 0, 0] = std**2 * length**2 * integral
-        cov[i, 0, 1] = cov[i, 1, 0] = std**2 * length * (1.0 - keep) ** 2
+        cov[i, 0, 1] = cov[i, 1, 0] = std**2 * length * moves**2
         cov[i, 1, 1] = std**2 * (1.0 - keep**2)
     return transition, cov
 
 
 @kernel
-def log_likelihood(transition, process_cov, row, z, variance, x0, cov0):
-    """Log-likelihood of the innovations, constant left out.
+def log_likelihood(step, span, row, z, sizes, start, opened):
+    """Log-likelihood of measurements of an integrated Gauss-Markov process, constant left out.
+
+    The states are the integral, the process, and an error of the measurement that lasts.
+
+    Parameters
+    ----------
+    step : (n,) from the row before to each, in the unit of the process's length
+    span : (n,) the same, in the unit of the error's length
+    row : (3,) what is measured of the states
+    z : (n,) measurements; NaN where there is none
+    sizes : (5,) standard deviation and length of the process, standard deviation of the noise,
+        standard deviation (0 for none) and length of the error
+    start, opened : integral before row 0 is measured, and its variance
+
+    Returns
+    -------
+    float
+    """
+    std, length, noise, lasting_std, lasting = sizes
+    r0, r1, r2 = row
+    var, noise_var, lasting_var = std * std, noise * noise, lasting_std * lasting_std
+    x0, x1, x2 = start, 0.0, 0.0
+    p00, p01, p02, p11, p12, p22 = opened, 0.0, 0.0, var, 0.0, lasting_var
+    total, product = 0.0, 1.0
+    for i in range(z.size):
+        if i > 0:
+            keep, moves, integral = _integrated(step[i] / length)
+            left = np.exp(-span[i] / lasting) if lasting_std > 0.0 else 1.0
+            a = length * moves
+            x0 += a * x1
+            x1 *= keep
+            x2 *= left
+            p00 += a * (2.0 * p01 + a * p11) + var * length * length * integral
+            p01 = keep * (p01 + a * p11) + var * length * moves * moves
+            p02 = left * (p02 + a * p12)
+            p11 = keep * keep * p11 + var * (1.0 - keep * keep)
+            p12 *= keep * left
+            p22 = left * left * p22 + lasting_var * (1.0 - left * left)
+        if np.isfinite(z[i]):
+            g0 = p00 * r0 + p01 * r1 + p02 * r2
+            g1 = p01 * r0 + p11 * r1 + p12 * r2
+            g2 = p02 * r0 + p12 * r1 + p22 * r2
+            spread = noise_var + r0 * g0 + r1 * g1 + r2 * g2
+            inverse = 1.0 / spread
+            error = z[i] - r0 * x0 - r1 * x1 - r2 * x2
+            gain = error * inverse
+            total += error * gain
+            x0 += g0 * gain
+            x1 += g1 * gain
+            x2 += g2 * gain
+            p00 -= g0 * g0 * inverse
+            p01 -= g0 * g1 * inverse
+            p02 -= g0 * g2 * inverse
+            p11 -= g1 * g1 * inverse
+            p12 -= g1 * g2 * inverse
+            p22 -= g2 * g2 * inverse
+            # One logarithm of many factors, which stay far from the limits of a number.
+            product *= spread
+            if not 1e-100 < product < 1e100:
+                total += np.log(product)
+                product = 1.0
+    return -0.5 * (total + np.log(product))
+
+
+@kernel
+def smooth(transition, process_cov, row, z, variance, x0, cov0):
+    """Smooth the state over all rows.
 
     Parameters
     ----------
@@ -115,28 +191,6 @@ def log_likelihood(transition, process_cov, row, z, variance, x0, cov0):
     z : (n,) measurements; NaN where there is none
     variance : (n,) of their noise
     x0, cov0 : (k,), (k, k) state before row 0 is measured
-
-    Returns
-    -------
-    float
-    """
-    k = x0.size
-    x, cov, gain, work = x0.copy(), cov0.copy(), np.empty(k), np.empty((3, k, k))
-    total = 0.0
-    for i in range(z.size):
-        if i > 0:
-            _predict(transition, process_cov, i, x, cov, work)
-        if np.isfinite(z[i]):
-            spread = _spread(cov, row, variance[i], gain)
-            error = _error(row, x, z[i])
-            total -= 0.5 * (np.log(spread) + error**2 / spread)
-            _update(x, cov, gain, error, spread)
-    return total
-
-
-@kernel
-def smooth(transition, process_cov, row, z, variance, x0, cov0):
-    """Smooth the state over all rows; parameters as of `log_likelihood`.
 
     Returns
     -------

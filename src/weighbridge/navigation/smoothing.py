@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Final
 
 import numpy as np
@@ -10,12 +9,6 @@ import numpy as np
 from weighbridge.kernels import rts
 from weighbridge.signals import Floats, Ints, Signal, resolution
 from weighbridge.signals.minimum import lowest_by_slopes
-
-_Model = tuple[Floats, Floats, float, Floats, Floats]
-"""Transitions, process covariances, noise variance, first state and its covariance."""
-
-_Models = Callable[[Floats], Callable[[Floats], _Model]]
-"""Of a clock (m,), then of logarithms of the sizes over the usual ones (levels,)."""
 
 ACCEL_TIME: Final = 3.0
 """How long a driver keeps an acceleration before the drive has shown [s]."""
@@ -72,41 +65,66 @@ def _merged(stamps: Floats, values: Floats, time: Floats) -> tuple[Floats, Float
 
 
 def _smooth_likeliest(
-    model: _Models,
+    usual: Floats,
     row: Floats,
     measured: tuple[Floats, Floats],
     time: Floats,
-    levels: int,
+    *,
+    way: Floats,
+    begins: tuple[float, float | None],
 ) -> tuple[Floats, Floats]:
-    """Smooth measurements by the sizes of noise and process that are likeliest.
+    """Smooth measurements of an integrated Gauss-Markov process by the sizes that are likeliest.
 
     Parameters
     ----------
-    model
-    row : (k,) of the state that is measured
+    usual : (3,) or (5,) standard deviation and length of the process, standard deviation of the
+        noise, and of an error that lasts its standard deviation and time
+    row : (3,) what is measured of integral, process and that error
     measured : stamps [s] and values (j,)
     time : (n,) instants asked for, rising [s]
-    levels : sizes that are sought
+    way : (n,) what the process is integrated over, there
+    begins : first value of the integral and its variance; that of the noise when None
 
     Returns
     -------
-    x, var : (n, k) states and their variances
+    x, var : (n, 2) or (n, 3) states and their variances
     """
     stamps, values = measured
     stride = _stride(stamps)
     thin = np.ascontiguousarray(values[::stride])
-    of_thin = model(stamps[::stride])
+    begin, opened = begins
+
+    def steps(clock: Floats) -> tuple[Floats, Floats]:
+        at = clock if way is time else np.interp(clock, time, way)
+        return np.diff(at, prepend=at[0]), np.diff(clock, prepend=clock[0])
+
+    def sizes(level: Floats) -> tuple[float, float, float, float, float]:
+        found = np.exp(np.log(usual) + level).tolist()
+        return (*found, 0.0, 1.0)[:5]
+
+    step, span = steps(stamps[::stride])
 
     def misfit(level: Floats) -> float:
-        transition, cov, noise, start, spread = of_thin(level)
-        var = np.full(thin.size, noise)
-        likelihood = rts.log_likelihood(transition, cov, row, thin, var, start, spread)
+        size = sizes(level)
+        first = size[2] ** 2 if opened is None else opened
+        likelihood = rts.log_likelihood(step, span, row, thin, size, begin, first)
         return float(-likelihood + 0.5 * np.sum((level / LEVEL_STD) ** 2))
 
-    found = lowest_by_slopes(misfit, np.zeros(levels), close=_CLOSE, farthest=_FARTHEST)
+    found = lowest_by_slopes(misfit, np.zeros(usual.size), close=_CLOSE, farthest=_FARTHEST)
+    std, length, noise, walk, lasting = sizes(found)
     clock, z, at = _merged(stamps, values, time)
-    transition, cov, noise, start, spread = model(clock)(found)
-    x, var = rts.smooth(transition, cov, row, z, np.full(clock.size, noise), start, spread)
+    step, span = steps(clock)
+    states = 2 if usual.size == 3 else 3
+    transition, cov = np.zeros((2, clock.size, states, states))
+    transition[:, :2, :2], cov[:, :2, :2] = rts.gauss_markov(step, length, std)
+    if states == 3:
+        keep = np.exp(-span / lasting)
+        transition[:, 2, 2], cov[:, 2, 2] = keep, walk**2 * (1.0 - keep**2)
+    first = noise**2 if opened is None else opened
+    spread = np.diag([first, std**2, walk**2][:states])
+    start = np.array([begin, 0.0, 0.0][:states])
+    variance = np.full(clock.size, noise**2)
+    x, var = rts.smooth(transition, cov, row[:states], z, variance, start, spread)
     return x[at], var[at]
 
 
@@ -134,20 +152,14 @@ def smooth_speed(speed: Signal, time: Floats) -> tuple[Floats, Floats, Floats, F
     Carroll et al., Measurement Error in Nonlinear Models, 2nd ed., 2006, ch. 1.
     """
     quantum = resolution(speed.values)
-    usual = np.log([ACCEL_STD, ACCEL_TIME, np.hypot(SPEED_NOISE, quantum / np.sqrt(12.0))])
-    row = np.array([1.0, 0.0])
-
-    def model(clock: Floats) -> Callable[[Floats], _Model]:
-        step, start = np.diff(clock, prepend=clock[0]), np.array([speed.values[0], 0.0])
-
-        def of(level: Floats) -> _Model:
-            std, length, noise = np.exp(usual + level)
-            transition, cov = rts.gauss_markov(step, length, std)
-            return transition, cov, noise**2, start, np.diag([noise**2, std**2])
-
-        return of
-
-    x, var = _smooth_likeliest(model, row, (speed.time, speed.values), time, 3)
+    x, var = _smooth_likeliest(
+        np.array([ACCEL_STD, ACCEL_TIME, np.hypot(SPEED_NOISE, quantum / np.sqrt(12.0))]),
+        np.array([1.0, 0.0, 0.0]),
+        (speed.time, speed.values),
+        time,
+        way=time,
+        begins=(float(speed.values[0]), None),
+    )
     std = np.sqrt(np.maximum(var, 0.0))
     return x[:, 0], x[:, 1], std[:, 0], std[:, 1]
 
@@ -176,30 +188,15 @@ def smooth_height(
     inside = (altitude.time >= time[0]) & (altitude.time <= time[-1])
     stamps, values = altitude.time[inside], altitude.values[inside]
     quantum = resolution(values)
-    usual = np.log(
-        [
-            GRADE_STD, GRADE_LENGTH, np.hypot(HEIGHT_NOISE, quantum / np.sqrt(12.0)),
-            HEIGHT_WALK, HEIGHT_TIME,
-        ]
-    )  # fmt: skip
-    row = np.array([1.0, 0.0, 1.0])
-
-    def model(clock: Floats) -> Callable[[Floats], _Model]:
-        way = np.interp(clock, time, distance)
-        road_step, step = np.diff(way, prepend=way[0]), np.diff(clock, prepend=clock[0])
-        start = np.array([values[0], 0.0, 0.0])
-
-        def of(level: Floats) -> _Model:
-            std, length, noise, walk, lasting = np.exp(usual + level)
-            keep = np.exp(-step / lasting)
-            transition, cov = np.zeros((clock.size, 3, 3)), np.zeros((clock.size, 3, 3))
-            transition[:, :2, :2], cov[:, :2, :2] = rts.gauss_markov(road_step, length, std)
-            transition[:, 2, 2], cov[:, 2, 2] = keep, walk**2 * (1.0 - keep**2)
-            return transition, cov, noise**2, start, np.diag([1e4, std**2, walk**2])
-
-        return of
-
-    x, var = _smooth_likeliest(model, row, (stamps, values), time, 5)
+    noise = np.hypot(HEIGHT_NOISE, quantum / np.sqrt(12.0))
+    x, var = _smooth_likeliest(
+        np.array([GRADE_STD, GRADE_LENGTH, noise, HEIGHT_WALK, HEIGHT_TIME]),
+        np.array([1.0, 0.0, 1.0]),
+        (stamps, values),
+        time,
+        way=distance,
+        begins=(float(values[0]), 1e4),
+    )
     return x[:, 0], x[:, 1], np.sqrt(np.maximum(var[:, 1], 0.0))
 
 
@@ -221,20 +218,12 @@ def smooth_grade(measured: Signal, time: Floats, distance: Floats) -> tuple[Floa
     quantum = resolution(measured.values)
     if not np.ptp(measured.values) > 0.0:
         return np.full(time.size, measured.values[0]), np.full(time.size, GRADE_NOISE)
-    usual = np.log([GRADE_STD, GRADE_LENGTH, np.hypot(GRADE_NOISE, quantum / np.sqrt(12.0))])
-    row = np.array([0.0, 1.0])
-
-    def model(clock: Floats) -> Callable[[Floats], _Model]:
-        way = np.interp(clock, time, distance)
-        step = np.diff(way, prepend=way[0])
-
-        def of(level: Floats) -> _Model:
-            std, length, noise = np.exp(usual + level)
-            transition, cov = rts.gauss_markov(step, length, std)
-            return transition, cov, noise**2, np.zeros(2), np.diag([0.0, std**2])
-
-        return of
-
-    stamps, values = measured.time, measured.values
-    x, var = _smooth_likeliest(model, row, (stamps, values), time, 3)
+    x, var = _smooth_likeliest(
+        np.array([GRADE_STD, GRADE_LENGTH, np.hypot(GRADE_NOISE, quantum / np.sqrt(12.0))]),
+        np.array([0.0, 1.0, 0.0]),
+        (measured.time, measured.values),
+        time,
+        way=distance,
+        begins=(0.0, 0.0),
+    )
     return x[:, 1], np.sqrt(np.maximum(var[:, 1], 0.0))

@@ -148,11 +148,14 @@ class Parabola(NamedTuple):
 
 def parabola(x: Floats, y: Floats) -> Parabola:
     """Fit a parabola by least squares: exact for three values (n,); more are less rough."""
-    middle = x[x.size // 2]
-    second, slope, _ = np.polyfit(x - middle, y, 2)
+    middle, unit = x[x.size // 2], 0.5 * float(x[-1] - x[0])
+    off = (x - middle) / unit
+    powers = np.stack((off * off, off, np.ones_like(off)))
+    second, slope, _ = np.linalg.solve(powers @ powers.T, powers @ y)
+    bend = 2.0 * float(second) / unit**2
     if not second > 0.0:
-        return Parabola(float(middle), 2.0 * float(second))
-    return Parabola(float(np.clip(middle - 0.5 * slope / second, x[0], x[-1])), 2.0 * float(second))
+        return Parabola(float(middle), bend)
+    return Parabola(float(np.clip(middle - 0.5 * unit * slope / second, x[0], x[-1])), bend)
 
 
 def lag_std(left: float, bend: float, rows: float) -> float:
