@@ -250,7 +250,7 @@ def test_port_that_is_not_there():
         parse_source("elm:/dev/no_such_port").run(lambda _: None, Event())
 
 
-def test_adapter_that_says_only_garbage_is_set_up_anew_and_given_up():
+def test_adapter_that_says_only_garbage_is_set_up_anew_and_given_up(monkeypatch):
     class Link:
         def __init__(self):
             self.written = []
@@ -269,7 +269,8 @@ def test_adapter_that_says_only_garbage_is_set_up_anew_and_given_up():
 
     link = Link()
     source = parse_source("elm:x")
-    source._links, source._probe = (lambda: link,), 0.0
+    source._links = (lambda: link,)
+    monkeypatch.setattr("weighbridge.live.sources.polling.PROBE", 0.0)
     with error(SourceError, "elm:x"):
         source.run(lambda _: None, Event())
     assert link.written.count(b"ATZ\r") == 2
