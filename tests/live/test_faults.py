@@ -241,7 +241,7 @@ def at_limit(s):
         pytest.param(IMU[:3], shaken, True, "imu.left_out", id="sensor left out"),
         pytest.param(IMU[3:], at_limit, True, "imu.gyro_clipped", id="gyro at its limit"),
         pytest.param((), None, False, "mass.unbacked", id="calibration without a tare"),
-        pytest.param(IMU, None, True, "motion.no_accelerometer", id="no inertial sensor"),
+        pytest.param(IMU, None, True, "motion.grade_by_height", id="no inertial sensor"),
     ],
 )
 def test_at_its_end_live_shows_what_a_weighing_does(car, loaded, names, fault, tare, problem):

@@ -415,10 +415,28 @@ def test_a_drive_without_the_accelerometer_of_its_calibration_says_so(empty, car
     blind = replace(
         blind, signals={n: s for n, s in blind.signals.items() if n[:5] not in ("accel", "gyro_")}
     )
-    found = weigh(blind, car)
+    found = weigh(blind, replace(car, without_accelerometer=None))
     assert any(text.id == "motion.no_accelerometer" for text in found.problems)
     assert found.result.std > 0.04 * found.result.mass
     assert not any(t.id == "motion.no_accelerometer" for t in weigh(empty.drive, car).problems)
+
+
+def test_a_drive_without_an_accelerometer_is_weighed_as_by_a_calibration_without(
+    empty, loaded, car, tmp_path
+):
+    def blind(drive):
+        return drive.without(*(n for n in drive.signals if n[:5] in ("accel", "gyro_")))
+
+    alike = calibrate(blind(empty.drive), vehicle=Vehicle(name="known", tare=car.tare))
+    car.save(tmp_path / "car.toml")
+    loaded_car = Vehicle.load(tmp_path / "car.toml")
+    expected = weigh(blind(loaded.drive), alike)
+    found = weigh(blind(loaded.drive), loaded_car)
+    assert found.mass == pytest.approx(expected.mass, abs=0.05 * expected.std)
+    assert found.std == pytest.approx(expected.std, rel=0.01)
+    assert not any(p.id == "motion.no_accelerometer" for p in found.problems)
+    assert found.vehicle == loaded_car
+    assert alike.without_accelerometer is None
 
 
 def test_a_torque_at_another_rate_than_in_the_calibration_widens_the_interval(empty, car):
@@ -430,7 +448,8 @@ def test_a_torque_at_another_rate_than_in_the_calibration_widens_the_interval(em
     found = []
     for then in (period, 5.0 * period):
         made = replace(car.provenance, motion="speed_grade", torque_period=then)
-        found.append(weigh(blind, replace(car, kind="truck", provenance=made)))
+        old = replace(car, kind="truck", provenance=made, without_accelerometer=None)
+        found.append(weigh(blind, old))
     same, other = found
     assert not any(p.id == "torque.other_rate" for p in same.problems)
     said = next(p for p in other.problems if p.id == "torque.other_rate")

@@ -143,6 +143,7 @@ def make_weighing(
     return Weighing(
         drive=Drive(name, {"vehicle_speed": Signal("vehicle_speed", time, speed)}),
         vehicle=VEHICLE,
+        seen=VEHICLE,
         method="rls",
         status=status,
         refusal=noted(why) if why else None,

@@ -120,6 +120,7 @@ def driven(
     return Weighing(
         drive=drive,
         vehicle=CAR,
+        seen=CAR,
         method="joint",
         status=track.status,
         refusal=track.reason,

@@ -39,6 +39,7 @@ def weighing(vehicle=CAR, status=None, **changes):
     return Weighing(
         drive=recorded,
         vehicle=vehicle,
+        seen=vehicle,
         method="rls",
         status=status or track.status,
         refusal=track.reason,

@@ -31,11 +31,12 @@ from weighbridge.calibration.rls import fit_rls
 from weighbridge.calibration.settings import CalibrationSettings
 from weighbridge.calibration.speed import SpeedCalibration, calibrate_by_speed
 from weighbridge.checks.steps import SAME, reading_step
-from weighbridge.errors import ConfigError
+from weighbridge.errors import ConfigError, WeighbridgeError
 from weighbridge.estimators.gate import GATE
 from weighbridge.estimators.judging import HIDDEN_BRAKE_STD
 from weighbridge.messages import Problem as Message
 from weighbridge.messages import phrase, refused
+from weighbridge.navigation import BY_SPEED, without_accelerometer
 from weighbridge.pipeline.given import (
     GivenDrive,
     GivenVehicle,
@@ -206,6 +207,10 @@ def run_calibration(
     if problem.source.gearing is not None:
         done = _with_gears(done, problem.given)
     _refuse_useless(done)
+    by_speed = None
+    if any(r.motion.source not in BY_SPEED for r in problem.recordings):
+        by_speed = _by_speed(drives, mass, vehicle, settings)
+    done = replace(done, without_accelerometer=by_speed)
     _LOG.info(
         "%s: %s fit of %d drives, %d samples, R² %.4f",
         done.name, settings.method, len(recorded), rows.time.size, rows.r_squared,
@@ -219,6 +224,22 @@ def run_calibration(
         held=fitted.held,
         problems=(*fitted.notes, *_balance_notes(balances), *notes),
     )
+
+
+def _by_speed(
+    drives: Drive | Sequence[Drive],
+    mass: float | Sequence[float] | None,
+    vehicle: Vehicle | None,
+    settings: CalibrationSettings,
+) -> Vehicle | None:
+    """Calibrate by what the drives record beside their accelerometer; None where that fails."""
+    every = [drives] if isinstance(drives, Drive) else drives
+    left = [without_accelerometer(drive) for drive in every]
+    try:
+        return run_calibration(left, mass, vehicle=vehicle, settings=settings).vehicle
+    except WeighbridgeError as error:
+        _LOG.info("no calibration without the accelerometer: %s", error)
+        return None
 
 
 def _mass_findings(

@@ -468,11 +468,15 @@ def with_drift(refined: Vehicle, change: Drift, times: Sequence[datetime]) -> Ve
         return refined
     months = (max(times) - min(times)).total_seconds() / MONTH
     std = 0.5 * 0.01 * abs(change.slope) * months
-    made = refined.provenance
-    left = math.hypot(made.mass_scale_std or 0.0, std)
-    wider = replace(refined, provenance=replace(made, mass_scale_std=left))
-    drifts = _drift_text(DRIFTS[0], change)
-    return noted(wider, Problem.of("calibration.drifts", drifts=drifts))
+    drifts = Problem.of("calibration.drifts", drifts=_drift_text(DRIFTS[0], change))
+
+    def wider(one: Vehicle) -> Vehicle:
+        left = math.hypot(one.provenance.mass_scale_std or 0.0, std)
+        made = replace(one.provenance, mass_scale_std=left)
+        return noted(replace(one, provenance=made), drifts)
+
+    other = refined.without_accelerometer
+    return replace(wider(refined), without_accelerometer=wider(other) if other else None)
 
 
 def drift(times: Sequence[datetime], values: Floats) -> Drift:

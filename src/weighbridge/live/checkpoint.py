@@ -21,7 +21,7 @@ from weighbridge.errors import ConfigError
 from weighbridge.pipeline.forward import ForwardSetup, ForwardState
 from weighbridge.vehicle import Vehicle
 
-VERSION: Final = 12
+VERSION: Final = 13
 """Of the layout; another one is refused."""
 
 LIGHTEST, HEAVIEST = 50.0, 200e3

@@ -45,8 +45,7 @@ def identify_motion(drive: Drive, vehicle: Vehicle | None = None) -> tuple[Motio
     DriveError
         No way is open; the sentence names what is missing.
     """
-    has_speed = drive.has("vehicle_speed") or drive.has("gnss_speed")
-    if drive.has(*IMU_SIGNALS) and (has_speed or drive.has("latitude", "longitude")):
+    if _inertial_sensor(drive):
         try:
             return _inertial(drive, vehicle)
         except LostError as lost:
@@ -57,9 +56,20 @@ def identify_motion(drive: Drive, vehicle: Vehicle | None = None) -> tuple[Motio
             return replace(motion, notes=(replace(left_out, serious=False), *motion.notes)), setup
     if drive.has("longitudinal_accel", "vehicle_speed"):
         return longitudinal_motion(true_speed(drive, vehicle)), None
-    if has_speed:
+    if drive.has("vehicle_speed") or drive.has("gnss_speed"):
         return speed_motion(true_speed(drive, vehicle)), None
     raise refused("speed.missing", drive=drive.name)
+
+
+def _inertial_sensor(drive: Drive) -> bool:
+    """Whether a drive can be navigated by an inertial sensor."""
+    has_speed = drive.has("vehicle_speed") or drive.has("gnss_speed")
+    return drive.has(*IMU_SIGNALS) and (has_speed or drive.has("latitude", "longitude"))
+
+
+def by_accelerometer(drive: Drive) -> bool:
+    """Whether the motion of a drive is found with an accelerometer."""
+    return _inertial_sensor(drive) or drive.has("longitudinal_accel", "vehicle_speed")
 
 
 def _inertial(drive: Drive, vehicle: Vehicle | None) -> tuple[Motion, Setup]:

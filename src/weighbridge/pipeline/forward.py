@@ -160,7 +160,7 @@ def identify_forward(weighing: Weighing, step: float = STEP) -> ForwardSetup:
             f"{weighing.drive.name}: a forward pass is set up by a weighing of method joint that "
             f"found a mass, not by one of {weighing.method}: {weighing.reason or 'no sizes'}"
         )
-    drive, vehicle, motion = weighing.drive, weighing.vehicle, result.balance.motion
+    drive, vehicle, motion = weighing.drive, weighing.seen, result.balance.motion
     navigation = result.balance.navigation
     if navigation is None:
         raise DriveError(

@@ -14,10 +14,11 @@ from weighbridge.balance.torque_drift import smoothed_steps
 from weighbridge.estimators.judging import lacks_accelerometer
 from weighbridge.estimators.squat import of_vehicle
 from weighbridge.messages import Problem, phrase, refused
-from weighbridge.navigation import identify_motion
+from weighbridge.navigation import by_accelerometer, identify_motion
 from weighbridge.pipeline.notes import other_equipment
 from weighbridge.signals import Drive
 from weighbridge.vehicle import Vehicle, by_power
+from weighbridge.vehicle.as_read import as_read
 
 CLOCKS_APART: Final = 0.6
 """Torque later by so much than in the calibration is another clock [s]: in simulated drives of one
@@ -34,8 +35,9 @@ class DriveSetup:
 
     Attributes
     ----------
-    vehicle : that of the file, with what the drive shows of it: the air that its engine breathes,
-        the scale of its torque by the battery, the tyres that it rolls on
+    vehicle : that of the file as calibrated with what the drive records, and what the drive shows
+        of it: the air that its engine breathes, the scale of its torque by the battery, the tyres
+        that it rolls on
     balance : forces and motion, on one clock
     notes : what was found and what is uncertain
     """
@@ -58,8 +60,10 @@ def identify(drive: Drive, vehicle: Vehicle) -> DriveSetup:
     DriveError
         Torque and motion are on clocks that differ, or no way to the motion is open.
     """
-    vehicle, notes = by_power(drive, in_this_air(drive, vehicle))
+    if vehicle.without_accelerometer is not None and not by_accelerometer(drive):
+        vehicle = as_read(vehicle.by_speed())
     found, navigation = identify_motion(drive, vehicle)
+    vehicle, notes = by_power(drive, in_this_air(drive, vehicle))
     motion = of_vehicle(found, vehicle)
     as_calibrated = vehicle.timing.torque_delay or 0.0
     balance = force_balance(drive, vehicle, motion, delay=as_calibrated)

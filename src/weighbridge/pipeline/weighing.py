@@ -204,11 +204,12 @@ def _weigh_all(drive: Drive, vehicle: Vehicle, method: str, settings: Any) -> We
     problems = drive.problems
     alone = ESTIMATORS[method].speed_alone
     seen = without_accelerometer(drive) if ESTIMATORS[method].by_speed else drive
+    given = vehicle
     if not alone:
         vehicle = as_read(vehicle)
     lacking = no_speed(drive) if alone else what_is_missing(drive, vehicle)
     if lacking:
-        return without_mass(drive, vehicle, method, lacking, problems)
+        return without_mass(drive, given, method, lacking, problems)
     own = ESTIMATORS[method].own_balance
     balance = own(drive, vehicle, settings) if own and settings is not None else None
     if balance is not None:
@@ -221,7 +222,8 @@ def _weigh_all(drive: Drive, vehicle: Vehicle, method: str, settings: Any) -> We
         vehicle, balance = setup.vehicle, setup.balance
         problems += setup.notes + vehicle.provenance.problems
         problems += fitted_for_another(vehicle, method) + unbacked(vehicle)
-    return weigh_balance(drive, vehicle, method, balance, problems, settings=settings)
+    found = weigh_balance(drive, vehicle, method, balance, problems, settings=settings)
+    return replace(found, vehicle=given)
 
 
 def weigh_balance(
@@ -237,7 +239,8 @@ def weigh_balance(
 
     Parameters
     ----------
-    drive, vehicle, method : as of `weigh`
+    drive, method : as of `weigh`
+    vehicle : as the drive shows it
     balance : forces and motion
     problems : what is known of the drive
     joined : what ``joint`` makes of the balance, which judges the other methods; None to find it
@@ -266,6 +269,7 @@ def weigh_balance(
     return Weighing(
         drive=drive,
         vehicle=vehicle,
+        seen=vehicle,
         method=method,
         status=status,
         refusal=reason,
@@ -288,6 +292,7 @@ def without_mass(
     return Weighing(
         drive=drive,
         vehicle=vehicle,
+        seen=vehicle,
         method=method,
         status=Status.MISSING_SIGNALS,
         refusal=reason,
@@ -337,8 +342,10 @@ def _by(weighing: Weighing, method: str, joined: MassTrack | None) -> Weighing:
     try:
         if done is None or _another_balance(weighing, method):
             return weigh_checked(drive, vehicle, method)
-        notes = fitted_for_another(vehicle, method)
-        return weigh_balance(drive, vehicle, method, done.balance, notes, joined)
+        seen = weighing.seen
+        notes = fitted_for_another(seen, method)
+        found = weigh_balance(drive, seen, method, done.balance, notes, joined)
+        return replace(found, vehicle=vehicle)
     except WeighbridgeError as error:
         return without_mass(drive, vehicle, method, Problem.from_error(error))
 

@@ -170,7 +170,7 @@ def weighing_answer(weighing: MassResult, judged: tuple[str, ...]) -> str:
             tare=tare,
             gross=weighing.vehicle.gross,
             payload=(low - empty, high - empty),
-            file=file_worth(weighing.vehicle),
+            file=file_worth(weighing.seen),
             advice=advice(weighing),
             judged=judged,
         )
@@ -250,8 +250,8 @@ def _left_by_file(weighing: MassResult) -> float:
     assert result is not None
     if math.isfinite(result.systematic_std):
         return min(result.systematic_std, weighing.std)
-    made = weighing.vehicle.provenance
-    scale = made.mass_scale_std if made.mass_scale_std is not None else scale_std(weighing.vehicle)
+    made = weighing.seen.provenance
+    scale = made.mass_scale_std if made.mass_scale_std is not None else scale_std(weighing.seen)
     return min(scale * weighing.mass, weighing.std)
 
 

@@ -175,7 +175,7 @@ def fit_panel(weighing: MassResult) -> Panel:
     result = weighing.result
     if result is None or not result.used.any():
         return Panel(title=title, absent="no force over specific force: not one sample was used.")
-    phi, y = regression(result.balance.table, weighing.vehicle)
+    phi, y = regression(result.balance.table, weighing.seen)
     known = result.used & np.isfinite(phi) & np.isfinite(y)
     known &= result.time >= _load_since(weighing)
     if not known.any():

@@ -129,7 +129,7 @@ def residual_section(weighing: MassResult, comparison: Sequence[MassResult]) -> 
         key=key,
         title=title,
         lead=f"A residual is {what}; its mean should stay near zero all along each axis."
-        + _slow_part(result, weighing.vehicle),
+        + _slow_part(result, weighing.seen),
         panels=tuple(residual_panel(weighing, beside, against) for against in _AXES),
     )
 
@@ -189,7 +189,7 @@ def residual_panel(weighing: MassResult, beside: Sequence[MassResult], against: 
     if not rows.any() or (against.name == "gear" and np.unique(x[rows]).size < 2):
         return Panel(title=title, absent=f"{nothing}: {against.absent}.")
     width = bin_width(x[rows], against.widths)
-    left = result.residual - slow_force(result, weighing.vehicle)
+    left = result.residual - slow_force(result, weighing.seen)
     index = spread(rows, POINTS)
     figure = blank(
         against.axis,

@@ -50,6 +50,7 @@ class MassResult(Explained):
     Attributes
     ----------
     drive, vehicle : what it was made from
+    seen : the vehicle as the drive shows it, by which it was weighed
     method : name of the estimator
     status : `Status`
     refusal : why there is no mass; None where there is
@@ -60,6 +61,7 @@ class MassResult(Explained):
 
     drive: Drive
     vehicle: Vehicle
+    seen: Vehicle
     method: str
     status: Status
     refusal: Problem | None

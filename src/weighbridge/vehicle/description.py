@@ -50,6 +50,8 @@ def tell(vehicle: Vehicle) -> list[tuple[str, str]]:
         said.append(("mapping", f"drives are read by {vehicle.mapping}, unless --mapping is given"))
     said.append(("made", _made(vehicle)))
     said.append(("worth", worth(vehicle)))
+    if vehicle.without_accelerometer is not None:
+        said.append(("no sensor", f"without an accelerometer {worth(vehicle.by_speed())}"))
     if vehicle.provenance.notes:
         said.append(("notes", vehicle.provenance.notes))
     return said

@@ -27,6 +27,9 @@ from weighbridge.whole import write_whole
 FORMAT_VERSION: Final = 1
 """Version of the vehicle file this program writes and reads."""
 
+_OTHER: Final = "without_accelerometer"
+"""Field of a vehicle, and super-section of a file."""
+
 # A comment that does not fit behind its key goes above it.
 _LINE: Final = 90
 
@@ -40,6 +43,11 @@ class Written(Protocol):
     @property
     def witnesses(self) -> tuple[SecondSignalRelation, ...]:
         """How the torque's reading goes with other signals of the engine."""
+        ...
+
+    @property
+    def without_accelerometer(self) -> Written | None:
+        """What the same drives show where their accelerometer is left out."""
         ...
 
 
@@ -64,6 +72,23 @@ def load_vehicle(path: str | Path, build: type[Made]) -> Made:
     _check_version(root)
     _refuse_lost_mapping(root)
     faults = Faults()
+    sections = _parts(root, faults)
+    beside = root.section(_OTHER)
+    other = _parts(beside, faults) if beside is not None else None
+    section = root.section("vehicle") or Section({}, root.name, root.lines, ("vehicle",))
+    values = _values(section, VEHICLE_KEYS, faults)
+    for read in (section, root, *([beside] if beside is not None else [])):
+        with faults.gathered():
+            read.done()
+    faults.refuse()
+    if other is not None:
+        sections[_OTHER] = _built(build, section, {**values, **other})
+    made: Made = _built(build, section, {**values, **sections})
+    return made
+
+
+def _parts(root: Section, faults: Faults) -> dict[str, Any]:
+    """Read the sections of a vehicle; faults are gathered."""
     sections: dict[str, Any] = {}
     for name, (part, keys) in SECTIONS.items():
         section = root.section(name)
@@ -87,14 +112,7 @@ def load_vehicle(path: str | Path, build: type[Made]) -> Made:
             sections[name] = _built(part, section, values)
     with faults.gathered():
         sections["witnesses"] = _witnesses(root)
-    section = root.section("vehicle") or Section({}, root.name, root.lines, ("vehicle",))
-    values = _values(section, VEHICLE_KEYS, faults)
-    for read in (section, root):
-        with faults.gathered():
-            read.done()
-    faults.refuse()
-    made: Made = _built(build, section, {**values, **sections})
-    return made
+    return sections
 
 
 def _values(section: Section, keys: Sequence[Key], faults: Faults) -> dict[str, Any]:
@@ -172,6 +190,25 @@ def save_vehicle(
     document = tomlkit.document()
     document.add(tomlkit.comment("A vehicle for weighbridge; every key carries its unit."))
     document.add("vehicle", _table(VEHICLE_KEYS, vehicle, exact=True))
+    _add_parts(document, vehicle, origins, exact=exact)
+    if vehicle.without_accelerometer is not None:
+        beside = tomlkit.table(is_super_table=True)
+        _add_parts(beside, vehicle.without_accelerometer, None, exact=exact)
+        document.add(tomlkit.nl())
+        document.add(tomlkit.comment("For drives that record no accelerometer: the same drives,"))
+        document.add(tomlkit.comment("calibrated without theirs."))
+        document.add(_OTHER, beside)
+    write_whole(path, tomlkit.dumps(document))
+
+
+def _add_parts(
+    document: tomlkit.TOMLDocument | Table,
+    vehicle: Written,
+    origins: Mapping[tuple[str, str], str] | None,
+    *,
+    exact: bool,
+) -> None:
+    """Add the sections of a vehicle to a document, or to a table in it."""
     for name, (_, keys) in SECTIONS.items():
         if name == "provenance" and vehicle.witnesses:
             every = tomlkit.table(is_super_table=True)
@@ -192,7 +229,6 @@ def save_vehicle(
         _table(keys, part, origin, exact=exact, table=table)
         if len(table):
             document.add(name, table)
-    write_whole(path, tomlkit.dumps(document))
 
 
 def _refuse_gaps(
@@ -295,7 +331,8 @@ def _built(build: type[Any], section: Section, values: Mapping[str, Any]) -> Any
     except ConfigError as e:
         message = str(e)
         said_of = {"vehicle": VEHICLE_KEYS, "witnesses": WITNESS_KEYS}
-        keys = said_of.get(section.path[0]) or SECTIONS[section.path[0]][1]
+        name = next(part for part in section.path if part != _OTHER)
+        keys = said_of.get(name) or SECTIONS[name][1]
         said = [
             k
             for key in sorted(keys, key=lambda k: len(k.stem), reverse=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Final, Literal, get_args
 
@@ -43,6 +43,12 @@ _PARTS: Final[dict[str, tuple[type, bool]]] = {
 """Parts of a vehicle by field: their type, and whether they may be None."""
 
 
+_SHARED: Final = (
+    "name", "kind", "type", "engine", "tare", "gross", "mapping", "speed_model", "ride"
+)  # fmt: skip
+"""Fields that no accelerometer changes."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Vehicle:
     """Everything that is known about one vehicle; see ``VEHICLE.toml``.
@@ -60,6 +66,8 @@ class Vehicle:
         not calibrated, or its drives did not show it
     witnesses : how that source varies with a second signal of the engine
     speed_model : for ``--method speed-ekf``; None where it was not calibrated
+    without_accelerometer : what its drives show where their accelerometer is left out, by which
+        drives that record none are weighed; None where the calibration had none, or too little
     """
 
     name: str = "vehicle"
@@ -79,6 +87,7 @@ class Vehicle:
     speed_model: SpeedModel | None = None
     ride: Ride | None = None
     provenance: Provenance = field(default_factory=Provenance)
+    without_accelerometer: Vehicle | None = None
 
     def __post_init__(self) -> None:
         check_text("name", self.name)
@@ -88,6 +97,8 @@ class Vehicle:
         for name, (part, optional) in _PARTS.items():
             if not (optional and getattr(self, name) is None):
                 check_type(name, getattr(self, name), part, f"a {part.__name__}")
+        if self.without_accelerometer is not None:
+            check_type("without_accelerometer", self.without_accelerometer, Vehicle, "a Vehicle")
         check_all("witnesses", self.witnesses, SecondSignalRelation, "SecondSignalRelation")
         check_choice("class", self.kind, VEHICLE_CLASSES)
         if self.engine is not None:
@@ -128,6 +139,13 @@ class Vehicle:
             f"{known}; torque by {self.torque.source}",
             by if made.masses else "never calibrated",
         )
+
+    def by_speed(self) -> Vehicle:
+        """Return the vehicle as a drive without an accelerometer is weighed; itself if unknown."""
+        other = self.without_accelerometer
+        if other is None:
+            return self
+        return replace(other, **{name: getattr(self, name) for name in _SHARED})
 
     @property
     def of_class(self) -> VehicleClass:
