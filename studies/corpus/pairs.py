@@ -620,12 +620,15 @@ def _cut_offs() -> Iterator[Pair]:
 
 
 def _other_sensors() -> Iterator[Pair]:
-    """Calibrated with an inertial sensor and weighed without, and with one without a gyroscope."""
+    """Calibrated with an inertial sensor and weighed without, and the other way round; without a
+    gyroscope.
+    """
     for of in MADE:
         name = "drive" if of.startswith("own") else "ordinary"
         heavy = " (truck)" if of.split()[-1] in ("truck", "semi", "electric_bus") else ""
         for made_by, seen, slice in (
             ("full", "no IMU", "calibrated with an IMU, weighed without"),
+            ("no IMU", "full", "calibrated without an IMU, weighed with"),
             ("accelerometer alone", "accelerometer alone", "accelerometer alone"),
         ):
             yield Pair(

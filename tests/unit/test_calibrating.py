@@ -421,9 +421,7 @@ def test_a_drive_without_the_accelerometer_of_its_calibration_says_so(empty, car
     assert not any(t.id == "motion.no_accelerometer" for t in weigh(empty.drive, car).problems)
 
 
-def test_a_drive_without_an_accelerometer_is_weighed_as_by_a_calibration_without(
-    empty, loaded, car, tmp_path
-):
+def test_drive_and_file_are_weighed_by_the_sensors_both_have(empty, loaded, car, tmp_path):
     def blind(drive):
         return drive.without(*(n for n in drive.signals if n[:5] in ("accel", "gyro_")))
 
@@ -437,6 +435,9 @@ def test_a_drive_without_an_accelerometer_is_weighed_as_by_a_calibration_without
     assert not any(p.id == "motion.no_accelerometer" for p in found.problems)
     assert found.vehicle == loaded_car
     assert alike.without_accelerometer is None
+    with_one = weigh(loaded.drive, alike)
+    assert with_one.mass == pytest.approx(expected.mass, abs=0.05 * expected.std)
+    assert any(p.id == "imu.file_without" for p in with_one.problems)
 
 
 def test_a_torque_at_another_rate_than_in_the_calibration_widens_the_interval(empty, car):

@@ -14,7 +14,12 @@ from weighbridge.balance.torque_drift import smoothed_steps
 from weighbridge.estimators.judging import lacks_accelerometer
 from weighbridge.estimators.squat import of_vehicle
 from weighbridge.messages import Problem, phrase, refused
-from weighbridge.navigation import by_accelerometer, identify_motion
+from weighbridge.navigation import (
+    BY_SPEED,
+    by_accelerometer,
+    identify_motion,
+    without_accelerometer,
+)
 from weighbridge.pipeline.notes import other_equipment
 from weighbridge.signals import Drive
 from weighbridge.vehicle import Vehicle, by_power
@@ -60,8 +65,7 @@ def identify(drive: Drive, vehicle: Vehicle) -> DriveSetup:
     DriveError
         Torque and motion are on clocks that differ, or no way to the motion is open.
     """
-    if vehicle.without_accelerometer is not None and not by_accelerometer(drive):
-        vehicle = as_read(vehicle.by_speed())
+    drive, vehicle, left_out = _with_the_same_sensors(drive, vehicle)
     found, navigation = identify_motion(drive, vehicle)
     vehicle, notes = by_power(drive, in_this_air(drive, vehicle))
     motion = of_vehicle(found, vehicle)
@@ -75,8 +79,36 @@ def identify(drive: Drive, vehicle: Vehicle) -> DriveSetup:
     delay, moved = _torque_delay(drive, vehicle, balance)
     if balance.delay != delay:
         balance = force_balance(drive, vehicle, motion, delay=delay)
-    notes += motion.notes + drifted + moved + other_equipment(vehicle, balance) + balance.notes
+    notes += (
+        left_out
+        + motion.notes
+        + drifted
+        + moved
+        + other_equipment(vehicle, balance)
+        + balance.notes
+    )
     return DriveSetup(vehicle=vehicle, balance=replace(balance, navigation=navigation), notes=notes)
+
+
+def _with_the_same_sensors(
+    drive: Drive, vehicle: Vehicle
+) -> tuple[Drive, Vehicle, tuple[Problem, ...]]:
+    """Take of a drive and of its vehicle file what both know: the accelerometer, or neither.
+
+    A motion by speed has errors of its own, and a torque that was calibrated by one contains them.
+    Of 32 drives of ten vehicles, files made without an accelerometer made those with one 3.7 % too
+    heavy in the mean (5.7 % RMS, ten intervals did not hold), and files made with one made those
+    without 3.5 % too light; alike, errors are 2.9 % RMS, and all intervals hold.
+    """
+    made = vehicle.provenance
+    if not by_accelerometer(drive):
+        known = vehicle.without_accelerometer is not None
+        return drive, as_read(vehicle.by_speed()) if known else vehicle, ()
+    has_speed = drive.has("vehicle_speed") or drive.has("gnss_speed")
+    if made.torque_fitted and made.motion in BY_SPEED and has_speed:
+        left_out = Problem.of("imu.file_without", vehicle=vehicle.name)
+        return without_accelerometer(drive), vehicle, (left_out,)
+    return drive, vehicle, ()
 
 
 def _torque_delay(
