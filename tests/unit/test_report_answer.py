@@ -21,7 +21,7 @@ def weighed(std, systematic=math.nan, vehicle=VEHICLE, method="joint", **changed
     result = replace(
         w.result, std=std, systematic_std=systematic, degrees_of_freedom=math.inf, **changed
     )
-    return replace(w, vehicle=vehicle, result=result, method=method)
+    return replace(w, vehicle=vehicle, seen=vehicle, result=result, method=method)
 
 
 def block(tmp_path, weighing, **options):

@@ -74,7 +74,7 @@ def test_air_flow_shows_what_the_load_stands_for(low, power):
     car = wb.calibrate([first], mass=known, settings=wb.CalibrationSettings(source="load"))
     assert "mass_air_flow" in {w.signal for w in car.witnesses}
     up = wb.weigh(lifted(drive, power), car)
-    exponent, std = up.vehicle.torque.in_thin_air
+    exponent, std = up.seen.torque.in_thin_air
     assert abs(exponent - power) < 2.0 * std < 0.5
     alone = wb.weigh(lifted(drive.without("mass_air_flow"), power), car)
     assert abs(up.mass - mass) < 0.6 * abs(alone.mass - mass)

@@ -133,8 +133,8 @@ def _refuse_lost_mapping(root: Section) -> None:
     if "mapping" in root.data:
         root.fail("mapping", remedy)
     for name, data in root.data.items():
-        if isinstance(data, dict) and name != "vehicle" and "mapping" in data:
-            Section(data, root.name, root.lines, (name,)).fail("mapping", remedy)
+        if isinstance(data, dict) and name != "vehicle":
+            _refuse_lost_mapping(Section(data, root.name, root.lines, (*root.path, name)))
 
 
 def _witnesses(root: Section) -> tuple[SecondSignalRelation, ...]:
