@@ -15,7 +15,7 @@ from weighbridge.balance.speed_balance import speed_balance
 from weighbridge.errors import ConfigError, DriveError, WeighbridgeError
 from weighbridge.estimators import ESTIMATORS, MassTrack, Status, differences
 from weighbridge.messages import Problem
-from weighbridge.navigation import without_accelerometer
+from weighbridge.navigation import BY_SPEED, without_accelerometer
 from weighbridge.pipeline.given import (
     GivenDrive,
     GivenVehicle,
@@ -161,12 +161,11 @@ def weigh_checked(drive: Drive, vehicle: Vehicle, method: str, settings: Any = N
     settings : of the estimator; its defaults when None
     """
     found = _weigh_all(drive, vehicle, method, settings)
-    less, made = without_accelerometer(drive), found.estimator
-    without = made.by_speed or made.speed_alone or len(less.signals) == len(drive.signals)
-    if without or not _by_noise(found):
+    by_speed = found.result is None or found.result.balance.motion.source in BY_SPEED
+    if by_speed or not _by_noise(found):
         return found
     try:
-        left = _weigh_all(less, vehicle, method, settings)
+        left = _weigh_all(without_accelerometer(drive), vehicle, method, settings)
     except DriveError:
         return found
     if left.status is not Status.CONVERGED:
