@@ -130,7 +130,8 @@ class Gpsd:
             client.settimeout(0.02)
             self.hang_up.clear()
             while not self.stop.is_set() and not self.hang_up.is_set():
-                with contextlib.suppress(TimeoutError):
+                # The client may go while reports are on their way to it.
+                with contextlib.suppress(OSError):
                     self.asked += client.recv(1024)
                 with contextlib.suppress(OSError):
                     for report in self.reports:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Final
+from typing import Final, Self
 
 import numpy as np
 
 from weighbridge.live.clock import now
 from weighbridge.live.source import Samples
 
-BLOCK: Final = 0.05
+BLOCK: Final = 0.2
 """A block is handed over after so long: samples are shown that much later at most [s]."""
 
 SLICE: Final = 0.1
@@ -18,7 +18,7 @@ SLICE: Final = 0.1
 
 
 class Gathered:
-    """Single samples on their way into blocks.
+    """Single samples on their way into blocks; as a context it hands all over at its end.
 
     Parameters
     ----------
@@ -29,6 +29,12 @@ class Gathered:
         self._put = put
         self._rows: dict[str, tuple[list[float], list[float]]] = {}
         self._begun = 0.0
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.flush()
 
     def add(self, time: float, values: Mapping[str, float]) -> None:
         """Add values [SI] of one instant [s]; hand a block over where it is time."""

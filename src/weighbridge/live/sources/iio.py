@@ -432,10 +432,10 @@ class IioSource:
 
     def run(self, put: Callable[[Samples], None], stop: Event) -> None:
         """Hand over readings until asked to stop; see `weighbridge.live.source.Source.run`."""
-        gathered = Gathered(put)
         folder = self._folder()
         node = self._nodes / folder.name
         with ExitStack() as stack:
+            gathered = stack.enter_context(Gathered(put))
             channels = self._channels(folder, stack)
             try:
                 with buffered(folder, node, [c.element for c in channels], self._rate) as buffer:
@@ -443,7 +443,6 @@ class IioSource:
             except UnbufferedError as error:
                 self._tell(error)
                 self._poll(channels, gathered, stop)
-        gathered.flush()
 
     def _drain(
         self, buffer: Buffer, channels: list[_Channel], gathered: Gathered, stop: Event

@@ -70,9 +70,8 @@ class LinesSource:
 
     def run(self, put: Callable[[Samples], None], stop: Event) -> None:
         """Hand over what lines say until asked to stop; see `live.source.Source.run`."""
-        gathered = Gathered(put)
         reader = LineReader(self.name)
-        with self._open() as read:
+        with Gathered(put) as gathered, self._open() as read:
             while not stop.is_set():
                 data = read()
                 if data is None:
@@ -81,7 +80,6 @@ class LinesSource:
                     gathered.add(time, values)
                 gathered.flush(BLOCK)
                 self.renewed = reader.renewed
-        gathered.flush()
 
 
 @contextmanager

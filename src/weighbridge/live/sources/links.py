@@ -134,9 +134,9 @@ class TcpLink:
     def read(self, timeout: float) -> bytes:
         """Return bytes as soon as some are there; none after ``timeout`` [s]."""
         try:
-            self._socket.settimeout(max(timeout, 0.001))
+            self._socket.settimeout(timeout)
             data = self._socket.recv(_MOST)
-        except TimeoutError:
+        except (TimeoutError, BlockingIOError):
             return b""
         except OSError as error:
             raise SourceError(f"{self._place} is gone ({_why(error)})") from error

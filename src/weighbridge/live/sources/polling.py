@@ -100,28 +100,30 @@ class Poller:
 
     def run(self) -> None:
         """Ask until asked to stop."""
-        while not self._stop.is_set():
-            volts = self._carrier.voltage()
-            if volts is not None and volts < LOW_VOLTAGE:
-                self._say(f"{LOW_BATTERY}; it is looked at again every {PROBE:g} s")
-                self._rest()
-                continue
-            supported = self._supported()
-            if not supported:
-                self._say(
-                    "the vehicle does not answer; is the ignition on? It is asked again every "
-                    f"{PROBE:g} s"
-                )
-                self._rest()
-                continue
-            schedule = Schedule(supported, together=self._carrier.together)
-            if schedule.empty:
-                self._say("the vehicle has none of the OBD-II parameters that a weighing can use")
-                self._rest()
-                continue
-            self._say("")
-            self._ask_until_silent(schedule)
-        self._gathered.flush()
+        with self._gathered:
+            while not self._stop.is_set():
+                volts = self._carrier.voltage()
+                if volts is not None and volts < LOW_VOLTAGE:
+                    self._say(f"{LOW_BATTERY}; it is looked at again every {PROBE:g} s")
+                    self._rest()
+                    continue
+                supported = self._supported()
+                if not supported:
+                    self._say(
+                        "the vehicle does not answer; is the ignition on? It is asked again every "
+                        f"{PROBE:g} s"
+                    )
+                    self._rest()
+                    continue
+                schedule = Schedule(supported, together=self._carrier.together)
+                if schedule.empty:
+                    self._say(
+                        "the vehicle has none of the OBD-II parameters that a weighing can use"
+                    )
+                    self._rest()
+                    continue
+                self._say("")
+                self._ask_until_silent(schedule)
 
     def _supported(self) -> dict[int, set[int]]:
         """Ask each control unit which parameters it has."""

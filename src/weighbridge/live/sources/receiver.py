@@ -72,24 +72,23 @@ class ReceiverSource:
                 link.close()
 
     def _listen(self, link: Link, put: Callable[[Samples], None], stop: Event) -> None:
-        gathered = Gathered(put)
         reader = self._make_reader()
         heard = monotonic()
         fixed = heard
-        while not stop.is_set():
-            data = link.read(SLICE)
-            if data:
-                heard = monotonic()
-            for time, values in reader.read(data, now()):
-                # The geometry of the satellites is known without a fix.
-                if values.keys() != {"hdop"}:
-                    fixed, self.trouble = monotonic(), ""
-                gathered.add(time, values)
-            gathered.flush(BLOCK)
-            if monotonic() - fixed > SILENT:
-                self.trouble = self._no_fix
-                if monotonic() - heard > SILENT and not self._shared:
-                    self.trouble = (
-                        f"the receiver sent nothing for {SILENT:g} s; check cable and rate"
-                    )
-        gathered.flush()
+        with Gathered(put) as gathered:
+            while not stop.is_set():
+                data = link.read(SLICE)
+                if data:
+                    heard = monotonic()
+                for time, values in reader.read(data, now()):
+                    # The geometry of the satellites is known without a fix.
+                    if values.keys() != {"hdop"}:
+                        fixed, self.trouble = monotonic(), ""
+                    gathered.add(time, values)
+                gathered.flush(BLOCK)
+                if monotonic() - fixed > SILENT:
+                    self.trouble = self._no_fix
+                    if monotonic() - heard > SILENT and not self._shared:
+                        self.trouble = (
+                            f"the receiver sent nothing for {SILENT:g} s; check cable and rate"
+                        )
