@@ -16,9 +16,9 @@ from weighbridge.messages import Problem as Message
 from weighbridge.messages import refused
 from weighbridge.results import DelaySearch, FittedRows
 from weighbridge.signals import Floats
-from weighbridge.vehicle import DraggedReading, Vehicle, rows_of
+from weighbridge.vehicle import DraggedReading, Vehicle
 from weighbridge.vehicle.model import EARLIEST_TORQUE, LATEST_TORQUE
-from weighbridge.vehicle.torque import parameters
+from weighbridge.vehicle.torque import torque_of
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -125,7 +125,7 @@ def torques(vehicle: Vehicle, recording: Recording, rows: DelayedRows) -> tuple[
     (n,), (n,) of all rows [N m]
     """
     table, model = rows.table, vehicle.torque
-    torque = rows_of(model, recording.reading, rows.engine_speed) @ parameters(model)
+    torque = torque_of(model, recording.reading, rows.engine_speed)
     mass = recording.mass - table.fuel_burnt
     taken = mass * mass_column(table, vehicle) + drag_force(table, vehicle)
     taken += rotating_force(table, vehicle)

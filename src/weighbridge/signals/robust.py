@@ -57,15 +57,9 @@ def huber(residual: Floats, scale: float, threshold: float = HUBER) -> Floats:
     -------
     (n,) in (0, 1]; all 1 where the scale is 0 and no residual is left
     """
-    return np.asarray(_hubers(residual, scale, threshold))
-
-
-def _hubers(residual: Floats, scale: Floats | float, threshold: float = HUBER) -> Floats:
-    """Weights as of `huber`, along the last axis, each set of rows by its own scale."""
     size = np.abs(residual)
     # What rounding leaves of a perfect fit is no outlier.
-    limit = threshold * scale + 1e-12 * size.max(axis=-1, initial=0.0) + 1e-300
-    limit = np.asarray(limit)[..., None]
+    limit = threshold * scale + 1e-12 * size.max(initial=0.0) + 1e-300
     return np.asarray(limit / np.maximum(size, limit))
 
 
@@ -99,24 +93,11 @@ def robust_fits(columns: Floats, y: Floats) -> tuple[Floats, Floats]:
     found : (b, k) parameters
     weight : (b, n) of the rows
     """
-    size = np.sqrt(np.mean(columns**2, axis=1)) + 1e-300
-    scaled = columns / size[:, None]
-    ridge = 1e-12 * y.shape[1] * np.eye(size.shape[1])
-    weight, found = np.ones_like(y), np.zeros_like(size)
-    left, own, reading = np.arange(len(y)), scaled, y
-    for _ in range(_ROUNDS):
-        rows = own.swapaxes(1, 2) * weight[left, None]
-        new = np.linalg.solve(rows @ own + ridge, rows @ reading[..., None])[..., 0]
-        change = np.max(np.abs(new - found[left]), axis=1)
-        found[left] = new
-        going = change > _SETTLED * np.max(np.abs(new), axis=1)
-        if not going.all():
-            left, own, reading, new = left[going], own[going], reading[going], new[going]
-            if not left.size:
-                break
-        residual = reading - (own @ new[..., None])[..., 0]
-        weight[left] = _hubers(residual, _NORMAL * np.median(np.abs(residual), axis=1))
-    return found / size, weight
+    from weighbridge.kernels.huber import fits  # The compiler is slow to load.
+
+    sets = (np.ascontiguousarray(a, dtype=np.float64) for a in (columns, y))
+    found, weight = fits(*sets, HUBER, _ROUNDS, _SETTLED)
+    return found, weight
 
 
 def median_of_three(values: Floats) -> Floats:

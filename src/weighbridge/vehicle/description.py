@@ -23,7 +23,7 @@ from weighbridge.vehicle.data_sheet import (
 )
 from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.road import Origin, Value
-from weighbridge.vehicle.torque import parameters, rows_of, source_of
+from weighbridge.vehicle.torque import source_of, torque_of
 
 _MOTIONS: Final = {
     "inertial": "inertial sensor with speed or GNSS",
@@ -137,7 +137,7 @@ def _torque(vehicle: Vehicle) -> str:
         low, high = model.speed_range
         turning = np.linspace(low, high, 60)
         most = model.load_range[1]
-        torque = rows_of(model, np.full(60, most), turning) @ parameters(model)
+        torque = torque_of(model, np.full(60, most), turning)
         k = int(np.argmax(torque))
         text += (
             f"; at {100.0 * most:.0f} % load, the highest the calibration saw, up to "

@@ -148,7 +148,7 @@ def knot_parts(engine_speed: Floats, knots: tuple[float, ...]) -> Floats:
 
 
 def rows_of(model: TorqueModel, reading: Floats, engine_speed: Floats) -> Floats:
-    """Rows (n, p) whose product with `parameters` is the torque of a model."""
+    """Rows (n, p) whose product with a model's coefficients, curvature and knots is its torque."""
     return torque_rows(
         reading,
         engine_speed,
@@ -158,9 +158,26 @@ def rows_of(model: TorqueModel, reading: Floats, engine_speed: Floats) -> Floats
     )
 
 
-def parameters(model: TorqueModel) -> Floats:
-    """Coefficients of a torque model (p,) in the order of `rows_of`."""
-    return np.array([*(model.coefficients or (0.0, 1.0)), *model.curvature, *model.knot_slopes])
+def torque_of(model: TorqueModel, reading: Floats, engine_speed: Floats) -> Floats:
+    """Torque that a reading means (n,) [N m].
+
+    Parameters
+    ----------
+    model
+    reading : (n,) in the unit of the source
+    engine_speed : (n,) [rad/s]; may be NaN where the model does not ask for it
+    """
+    offset, scale, *powers = model.coefficients or (0.0, 1.0)
+    speed_slope, bend = model.curvature or (0.0, 0.0)
+    slope = scale + bend * reading
+    if speed_slope:
+        slope = slope + speed_slope * engine_speed
+    if model.knots:
+        slope = slope + np.interp(engine_speed, model.knots, model.knot_slopes)
+    torque = offset + slope * reading
+    for k, w in enumerate(powers, start=1):
+        torque = torque + w * engine_speed**k
+    return np.asarray(torque)
 
 
 def reading_of(torque: Floats, engine_speed: Floats, model: TorqueModel) -> Floats:
@@ -179,7 +196,7 @@ def reading_of(torque: Floats, engine_speed: Floats, model: TorqueModel) -> Floa
         rest = rest + w * engine_speed**k
     slope = scale + speed_slope * engine_speed
     if model.knots:
-        slope = slope + knot_parts(engine_speed, model.knots) @ np.array(model.knot_slopes)
+        slope = slope + np.interp(engine_speed, model.knots, model.knot_slopes)
     # The root that stays finite where the map is straight; where it bends so far that
     # there is none, its turning point.
     root = np.sqrt(np.maximum(slope**2 - 4.0 * bend * rest, 0.0))
@@ -276,12 +293,12 @@ def engine_torque(
     x = share * source.reading(drive, time, model)
     nowhere = np.zeros(time.size, dtype=bool)
     if source.signed:
-        torque = _by_map(model, x, engine_speed)
+        torque = torque_of(model, x, engine_speed)
         return Torque(time, torque, nowhere, nowhere)
     dragged = averaged(x, period, DRAGGED_TIME, time=time, ahead=ahead)
     if not model.coefficients:
         return Torque(time, x, nowhere, dragged <= 0.0)
-    torque = _by_map(model, x, engine_speed)
+    torque = torque_of(model, x, engine_speed)
     low, high = model.load_range or (-math.inf, math.inf)
     slow, fast = model.speed_range or (-math.inf, math.inf)
     extrapolated = (dragged > high) | (engine_speed < slow) | (engine_speed > fast)
@@ -303,11 +320,3 @@ def in_air(charge: float | None, exponent: float, air: Air, altitude: Floats) ->
     if charge is None or not air.known or exponent == 0.0:
         return 1.0
     return np.asarray((air.charge(altitude) / charge) ** exponent)
-
-
-def _by_map(model: TorqueModel, reading: Floats, engine_speed: Floats) -> Floats:
-    """Torque that a reading means (n,) [N m]; engine speed is asked for where it shows."""
-    straight = len(model.coefficients) <= 2 and not model.curvature and not model.knots
-    known = np.zeros_like(reading) if straight else engine_speed
-    torque = rows_of(model, reading, known) @ parameters(model)
-    return np.asarray(np.where(np.isfinite(known), torque, np.nan))
