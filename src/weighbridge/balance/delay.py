@@ -105,7 +105,7 @@ def clock_shift(drive: Drive, vehicle: Vehicle, motion: Motion, begun: ForceBala
     """
     known = begun.delay
     shifts = np.array([-0.8, -_NEAR_BY, 0.0, _NEAR_BY, 0.8])
-    misfit, rows = _misfit(drive, vehicle, motion, begun, known + shifts[[0, -1]])
+    misfit, rows = _misfit(drive, vehicle, motion, begun, known + shifts[shifts != 0.0])
     scores = np.array([misfit(float(known + shift)) for shift in shifts])
     if not np.isfinite(scores).all():
         return 0.0

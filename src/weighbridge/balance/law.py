@@ -121,15 +121,13 @@ def road_columns(table: ForceTable, mass: Floats | float, wheel_radius: float) -
     )
 
 
-def wind_columns(table: ForceTable) -> tuple[Floats, Floats]:
-    """Of ``C_d A`` times the head wind of one who drives north, and east (n,) [N per m^3/s].
+def wind_column(table: ForceTable, part: int) -> Floats:
+    """Of ``C_d A`` times the head wind of one who drives north, or east (part 1) [N per m^3/s].
 
     The drag of a wind small against the speed is linear in it: ``rho v`` times its part along
     the road. Zero where the heading is unknown.
     """
-    north, east = table.direction
-    push = table.air_density * table.speed
-    return push * north, push * east
+    return table.air_density * table.speed * table.direction(part)
 
 
 def resistance_column(table: ForceTable) -> Floats:

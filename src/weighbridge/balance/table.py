@@ -144,12 +144,11 @@ class ForceTable:
         """Of the air against the vehicle (n,) [Pa]; negative where it blows from behind."""
         return dynamic_pressure(self.air_density, self.air_speed)
 
-    @property
-    def direction(self) -> tuple[Floats, Floats]:
-        """North and east part of the direction driven (n,) [-]; zero where it is unknown."""
+    def direction(self, part: int) -> Floats:
+        """North part of the direction driven, or east (part 1) (n,) [-]; zero where unknown."""
         known = np.isfinite(self.heading)
         heading = np.where(known, self.heading, 0.0)
-        return np.where(known, np.cos(heading), 0.0), np.where(known, np.sin(heading), 0.0)
+        return np.where(known, (np.cos, np.sin)[part](heading), 0.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -194,20 +194,26 @@ class Records:
                 )
             column = self._columns.get(name) or self._column(name)
             at = time - self.offset
-            finite = np.isfinite(at) & np.isfinite(values)
-            near = finite & (at > first) & (at < last)
-            fresh = near & (at >= in_time)
-            self._count(self.unfit, name, int(np.count_nonzero(~near)))
-            self._count(self.late, name, int(np.count_nonzero(near & ~fresh)))
-            strange.append(at[finite & ~near])
-            ordinary = ordinary or bool(near.any())
-            if fresh.any():
-                at = at[fresh]
-                column.blocks.append((at, values[fresh]))
-                column.newest = max(column.newest, float(at.max()))
-                self._resume(float(at.min()))
-                newest = max(newest, float(at.max()))
-                self.oldest = min(self.oldest, float(at.min()))
+            # Nearly every block is as it should be.
+            sound = at.size and first < at.min() >= in_time and at.max() < last
+            if not (sound and np.isfinite(values).all()):
+                finite = np.isfinite(at) & np.isfinite(values)
+                near = finite & (at > first) & (at < last)
+                fresh = near & (at >= in_time)
+                self._count(self.unfit, name, int(np.count_nonzero(~near)))
+                self._count(self.late, name, int(np.count_nonzero(near & ~fresh)))
+                strange.append(at[finite & ~near])
+                ordinary = ordinary or bool(near.any())
+                at, values = at[fresh], values[fresh]
+                if not at.size:
+                    continue
+            ordinary = True
+            earliest, latest = float(at.min()), float(at.max())
+            column.blocks.append((at, values))
+            column.newest = max(column.newest, latest)
+            self._resume(earliest)
+            newest = max(newest, latest)
+            self.oldest = min(self.oldest, earliest)
         self.newest = newest
         self._watch(np.concatenate([*strange, _NONE]), ordinary)
 

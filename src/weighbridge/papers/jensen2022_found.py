@@ -295,7 +295,7 @@ def _highway(done: Reproduction, way: str, car: Vehicle, rls: RlsSettings) -> di
             continue
         masses = run_in_turn([h.balance for h in trips], car, rls)
         errors = np.concatenate([m / h.true_mass for m, h in zip(masses, trips, strict=True)])
-        along = np.concatenate([h.balance.table.direction[0] for h in trips])
+        along = np.concatenate([h.balance.table.direction(0) for h in trips])
         table = trips[0].balance.table
         late = slice(int(np.searchsorted(table.time - table.time[0], SETTLED)), None)
         errors, along = 100.0 * (errors[late] - 1.0), along[late]

@@ -144,7 +144,7 @@ def passes(drives: Sequence[DriveResult]) -> tuple[float, float]:
         table = d.balance.table
         off = 100.0 * (d.track.running_mass / d.true_mass - 1.0)
         fast = (table.speed > HIGHWAY_SPEED) & np.isfinite(off)
-        along, _ = table.direction
+        along = table.direction(0)
         south.append(off[fast & (along < -0.5)])
         north.append(off[fast & (along > 0.5)])
     return float(np.concatenate(south).mean()), float(np.concatenate(north).mean())

@@ -134,7 +134,7 @@ def _wind(name: str, part: int) -> Term:
         name=f"wind_{name}",
         title=f"wind at the vehicle from {name}",
         unit="m/s",
-        column=lambda t, v, _: v.road.drag_area.value * law.wind_columns(t)[part],
+        column=lambda t, v, _: v.road.drag_area.value * law.wind_column(t, part),
         std=lambda *_: WIND_STD,
         time_constant=WIND_LASTS,
     )
