@@ -125,6 +125,43 @@ class MassTrack:
             ),
         )
 
+    def joined(self, other: MassTrack, correlation: float) -> MassTrack:
+        """Return the track with the mean of two answers by their uncertainty in all its masses.
+
+        Parameters
+        ----------
+        other : a track of the same drive by other sensors
+        correlation : of the errors of the two [-]
+
+        Returns
+        -------
+        This track or the other, unchanged, where the mean is surer without the second one
+
+        References
+        ----------
+        Best linear unbiased mean of two: Aitken, Proc. Royal Society of Edinburgh 55, 1936.
+        """
+        a, b = self.std, other.std
+        common = correlation * a * b
+        share = (a**2 - common) / (a**2 + b**2 - 2.0 * common)
+        if not 0.0 < share < 1.0:
+            return other if share >= 1.0 else self
+        rest = 1.0 - share
+        mass = rest * self.mass + share * other.mass
+        std = math.sqrt((rest * a) ** 2 + (share * b) ** 2 + 2.0 * rest * share * common)
+        moved, surer = mass / self.mass, std / self.std
+        return replace(
+            self,
+            mass=mass,
+            std=std,
+            systematic_std=surer * self.systematic_std,
+            running_mass=moved * self.running_mass,
+            running_std=surer * self.running_std,
+            segments=tuple(
+                replace(s, mass=moved * s.mass, std=surer * s.std) for s in self.segments
+            ),
+        )
+
     @property
     def time(self) -> Floats:
         """(n,) instants of the rows [s]."""
