@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,10 @@ if TYPE_CHECKING:
     from weighbridge.estimators.joint.problem import FilterInput, JointSizes
     from weighbridge.estimators.joint.slow_errors import SlowErrors
     from weighbridge.estimators.joint.switched import Switched
+
+
+APART: Final = 3.0
+"""Standard deviations of the difference by which two answers contradict each other [-]."""
 
 
 class Status(StrEnum):
@@ -135,7 +139,8 @@ class MassTrack:
 
         Returns
         -------
-        This track or the other, unchanged, where the mean is surer without the second one
+        This track or the other, unchanged, where the mean is surer without the second one; of two
+        that are `APART` the surer one
 
         References
         ----------
@@ -143,7 +148,10 @@ class MassTrack:
         """
         a, b = self.std, other.std
         common = correlation * a * b
-        share = (a**2 - common) / (a**2 + b**2 - 2.0 * common)
+        variance = a**2 + b**2 - 2.0 * common
+        if (self.mass - other.mass) ** 2 > APART**2 * variance:
+            return other if b < a else self
+        share = (a**2 - common) / variance
         if not 0.0 < share < 1.0:
             return other if share >= 1.0 else self
         rest = 1.0 - share
