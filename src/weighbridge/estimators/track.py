@@ -129,13 +129,16 @@ class MassTrack:
             ),
         )
 
-    def joined(self, other: MassTrack, correlation: float) -> MassTrack:
+    def joined(self, other: MassTrack, shared: float, correlation: float) -> MassTrack:
         """Return the track with the mean of two answers by their uncertainty in all its masses.
+
+        The interval stays that of the surer one: how much surer both are is known too little.
 
         Parameters
         ----------
         other : a track of the same drive by other sensors
-        correlation : of the errors of the two [-]
+        shared : standard deviation of what is wrong in both, relative to the mass [-]
+        correlation : of the errors beside that [-]
 
         Returns
         -------
@@ -146,17 +149,15 @@ class MassTrack:
         ----------
         Best linear unbiased mean of two: Aitken, Proc. Royal Society of Edinburgh 55, 1936.
         """
-        a, b = self.std, other.std
+        a, b = self.own_std(shared), other.own_std(shared)
         common = correlation * a * b
         variance = a**2 + b**2 - 2.0 * common
-        if (self.mass - other.mass) ** 2 > APART**2 * variance:
+        if (self.mass - other.mass) ** 2 >= APART**2 * variance:
             return other if b < a else self
         share = (a**2 - common) / variance
         if not 0.0 < share < 1.0:
             return other if share >= 1.0 else self
-        rest = 1.0 - share
-        mass = rest * self.mass + share * other.mass
-        std = math.sqrt((rest * a) ** 2 + (share * b) ** 2 + 2.0 * rest * share * common)
+        mass, std = (1.0 - share) * self.mass + share * other.mass, min(self.std, other.std)
         moved, surer = mass / self.mass, std / self.std
         return replace(
             self,
@@ -169,6 +170,15 @@ class MassTrack:
                 replace(s, mass=moved * s.mass, std=surer * s.std) for s in self.segments
             ),
         )
+
+    def own_std(self, shared: float) -> float:
+        """Standard deviation of the mass without what is wrong in other answers too [kg].
+
+        Parameters
+        ----------
+        shared : standard deviation of that, relative to the mass [-]
+        """
+        return math.sqrt(max(self.std**2 - (shared * self.mass) ** 2, 0.0))
 
     @property
     def time(self) -> Floats:

@@ -26,6 +26,7 @@ from weighbridge.pipeline.given import (
 )
 from weighbridge.pipeline.hypotheses import Case, refused_by_balance, weighed_against
 from weighbridge.pipeline.notes import (
+    UNBACKED_STD,
     below_tare,
     beside_speed,
     beyond_class,
@@ -162,7 +163,8 @@ def weigh_checked(drive: Drive, vehicle: Vehicle, method: str, settings: Any = N
     """
     found = _weigh_all(drive, vehicle, method, settings)
     with_it = found.result
-    if method != DEFAULT_METHOD or with_it is None or not _unsure(found):
+    shared = UNBACKED_STD if unbacked(vehicle) else 0.0
+    if method != DEFAULT_METHOD or with_it is None or not _unsure(found, shared):
         return found
     if with_it.balance.motion.source in BY_SPEED:
         return found
@@ -174,7 +176,8 @@ def weigh_checked(drive: Drive, vehicle: Vehicle, method: str, settings: Any = N
     if without is None or left.status is not Status.CONVERGED:
         return found
     if found.status is Status.CONVERGED:
-        joined = with_it.joined(without, 1.0 if vehicle.without_accelerometer is None else ALIKE)
+        alike = 1.0 if vehicle.without_accelerometer is None else ALIKE
+        joined = with_it.joined(without, shared, alike)
         if joined is with_it:
             return found
         if joined is not without:
@@ -193,8 +196,8 @@ NOISY: Final = ("motion.wide", "imu.noise", "gear.drift")
 limit in bends, so that the motion drifts off the gears."""
 
 UNSURE_STD: Final = 0.025
-"""Standard deviation of a mass from which a second one without the inertial sensor is asked for
-[-]: that is 3 to 5 %, and has no weight beside a surer one."""
+"""Standard deviation of a mass, beside what is wrong in both, from which one without the inertial
+sensor is asked for too [-]: that is 3 to 5 %, and has no weight beside a surer one."""
 
 ALIKE: Final = 0.5
 """Correlation of the errors of the two masses [-]: of 330 drives it was 0.0 to 0.8 by kind of
@@ -202,12 +205,14 @@ vehicle and equipment, 0.4 in the mean. A file that was not calibrated without t
 same errors in both: the surer one counts."""
 
 
-def _unsure(found: Weighing) -> bool:
+def _unsure(found: Weighing, shared: float) -> bool:
     """Whether a mass is lacking or wide, perhaps by the inertial sensor."""
-    if found.status is Status.CONVERGED:
-        return found.std > UNSURE_STD * found.mass
     result = found.result
-    return found.reason_id in NOISY and result is not None and math.isfinite(result.mass)
+    if result is None or not math.isfinite(result.mass):
+        return False
+    if found.status is Status.CONVERGED:
+        return result.own_std(shared) > UNSURE_STD * result.mass
+    return found.reason_id in NOISY
 
 
 def _weigh_all(drive: Drive, vehicle: Vehicle, method: str, settings: Any) -> Weighing:
