@@ -40,7 +40,7 @@ def apart(slow):
 def test_the_mass_is_the_mean_of_both(slow, apart):
     drive, mass, file = slow
     (own, without), weighed = apart, wb.weigh(drive, file)
-    assert weighed.mass == own.joined(without, 0.0, ALIKE).mass
+    assert weighed.mass == own.joined(without, ALIKE).mass
     assert min(own.mass, without.mass) < weighed.mass < max(own.mass, without.mass)
     assert weighed.std == min(own.std, without.std)
     assert abs(weighed.mass - mass) < 1.96 * weighed.std
@@ -51,7 +51,7 @@ def test_the_mass_is_the_mean_of_both(slow, apart):
 def test_what_is_unlikely_of_a_mass_is_said_of_the_mean(slow, apart):
     drive, _, file = slow
     own, without = apart
-    mean = own.joined(without, 0.0, ALIKE).mass
+    mean = own.joined(without, ALIKE).mass
     for gross, above in ((mean + 1.0, False), (mean - 1.0, True)):
         found = wb.weigh(drive, replace(file, gross=gross)).problems
         assert any(p.id == "mass.above_permitted" for p in found) == above
@@ -64,27 +64,26 @@ def test_published_methods_weigh_as_they_are(slow):
 
 def test_weights_are_those_of_least_variance(apart):
     track = apart[0]
-    first, second = (replace(track, mass=m, std=s) for m, s in ((1000.0, 30.0), (1080.0, 40.0)))
-    joined = first.joined(second, 0.0, 0.5)
+    first, second = (
+        replace(track, mass=m, std=s, doubt=0.0) for m, s in ((1000.0, 30.0), (1080.0, 40.0))
+    )
+    joined = first.joined(second, 0.5)
     # 900 - 600 over 900 + 1600 - 1200.
     assert joined.mass == pytest.approx(1000.0 + 80.0 * 300.0 / 1300.0)
-    assert second.joined(first, 0.0, 0.5).mass == pytest.approx(joined.mass)
+    assert second.joined(first, 0.5).mass == pytest.approx(joined.mass)
     assert joined.std == 30.0
     assert joined.running_mass[-1] / track.running_mass[-1] == pytest.approx(joined.mass / 1000.0)
 
 
-def test_what_is_wrong_in_both_does_not_change_the_weights(apart):
-    own, rest = np.array([30.0, 40.0]), 0.02
-    alone, shared = (
-        replace(apart[0], mass=1000.0, std=30.0),
-        replace(apart[0], mass=1000.0, std=float(np.hypot(30.0, 1000.0 * rest))),
+def test_a_doubt_of_the_drive_does_not_change_the_weights(apart):
+    first, second = (
+        replace(apart[0], mass=m, std=s, doubt=0.0) for m, s in ((1000.0, 30.0), (1050.0, 40.0))
     )
-    beside = 1050.0
-    without = replace(alone, mass=beside, std=own[1])
-    as_well = replace(alone, mass=beside, std=float(np.hypot(own[1], beside * rest)))
-    mean = alone.joined(without, 0.0, 0.5).mass
-    assert 1000.0 < mean < 1020.0
-    assert shared.joined(as_well, rest, 0.5).mass == pytest.approx(mean)
+    mean = first.joined(second, 0.5)
+    doubted = first.doubted(0.05).joined(second.doubted(0.05), 0.5)
+    assert 1000.0 < mean.mass < 1020.0
+    assert doubted.mass == pytest.approx(mean.mass)
+    assert doubted.std == pytest.approx(np.hypot(30.0, 50.0))
 
 
 @pytest.mark.parametrize(
@@ -97,8 +96,8 @@ def test_what_is_wrong_in_both_does_not_change_the_weights(apart):
     ],
 )
 def test_the_surer_one_counts_alone(apart, mass, std, correlation):
-    sure = replace(apart[0], mass=1000.0, std=30.0)
+    sure = replace(apart[0], mass=1000.0, std=30.0, doubt=0.0)
     other = replace(sure, mass=mass, std=std)
-    assert sure.joined(other, 0.0, correlation) is sure
+    assert sure.joined(other, correlation) is sure
     if std > 30.0:
-        assert other.joined(sure, 0.0, correlation) is sure
+        assert other.joined(sure, correlation) is sure

@@ -67,6 +67,7 @@ class MassTrack:
     mass, std : final answer and its standard deviation [kg]
     systematic_std : part of ``std`` that vehicle file and equipment leave, whatever the drive
         [kg]; NaN where a method does not say
+    doubt : part of ``std`` that is left by what else may explain the drive, relative to the mass [-]
     degrees_of_freedom : behind ``std``, for the interval; infinite if known
     bound_std : Cramér-Rao bound of this drive [kg]
     converged_at : when the running mass stays within 5 % of the final answer
@@ -100,6 +101,7 @@ class MassTrack:
     reason: Problem | None
     segments: tuple[Segment, ...]
     systematic_std: float = math.nan
+    doubt: float = 0.0
     sensitivity: Floats | None = None
     shape_sensitivity: Floats | None = None
     slow_errors: SlowErrors | None = None
@@ -123,13 +125,14 @@ class MassTrack:
             self,
             std=float(np.hypot(self.std, more)),
             systematic_std=float(np.hypot(self.systematic_std, more)),
+            doubt=math.hypot(self.doubt, share),
             running_std=np.hypot(self.running_std, share * self.running_mass),
             segments=tuple(
                 replace(s, std=float(np.hypot(s.std, share * s.mass))) for s in self.segments
             ),
         )
 
-    def joined(self, other: MassTrack, shared: float, correlation: float) -> MassTrack:
+    def joined(self, other: MassTrack, correlation: float) -> MassTrack:
         """Return the track with the mean of two answers by their uncertainty in all its masses.
 
         The interval stays that of the surer one: how much surer both are is known too little.
@@ -137,8 +140,7 @@ class MassTrack:
         Parameters
         ----------
         other : a track of the same drive by other sensors
-        shared : standard deviation of what is wrong in both, relative to the mass [-]
-        correlation : of the errors beside that [-]
+        correlation : of the errors beside what else may explain the drive, which is in both [-]
 
         Returns
         -------
@@ -149,7 +151,7 @@ class MassTrack:
         ----------
         Best linear unbiased mean of two: Aitken, Proc. Royal Society of Edinburgh 55, 1936.
         """
-        a, b = self.own_std(shared), other.own_std(shared)
+        a, b = self.own_std, other.own_std
         common = correlation * a * b
         variance = a**2 + b**2 - 2.0 * common
         if (self.mass - other.mass) ** 2 >= APART**2 * variance:
@@ -171,14 +173,10 @@ class MassTrack:
             ),
         )
 
-    def own_std(self, shared: float) -> float:
-        """Standard deviation of the mass without what is wrong in other answers too [kg].
-
-        Parameters
-        ----------
-        shared : standard deviation of that, relative to the mass [-]
-        """
-        return math.sqrt(max(self.std**2 - (shared * self.mass) ** 2, 0.0))
+    @property
+    def own_std(self) -> float:
+        """Standard deviation of the mass without what else may explain the drive [kg]."""
+        return math.sqrt(max(self.std**2 - (self.doubt * self.mass) ** 2, 0.0))
 
     @property
     def time(self) -> Floats:

@@ -26,7 +26,6 @@ from weighbridge.pipeline.given import (
 )
 from weighbridge.pipeline.hypotheses import Case, refused_by_balance, weighed_against
 from weighbridge.pipeline.notes import (
-    UNBACKED_STD,
     below_tare,
     beside_speed,
     beyond_class,
@@ -163,8 +162,7 @@ def weigh_checked(drive: Drive, vehicle: Vehicle, method: str, settings: Any = N
     """
     found = _weigh_all(drive, vehicle, method, settings)
     with_it = found.result
-    shared = UNBACKED_STD if unbacked(vehicle) else 0.0
-    if method != DEFAULT_METHOD or with_it is None or not _unsure(found, shared):
+    if method != DEFAULT_METHOD or with_it is None or not _unsure(found):
         return found
     if with_it.balance.motion.source in BY_SPEED:
         return found
@@ -177,7 +175,7 @@ def weigh_checked(drive: Drive, vehicle: Vehicle, method: str, settings: Any = N
         return found
     if found.status is Status.CONVERGED:
         alike = 1.0 if vehicle.without_accelerometer is None else ALIKE
-        joined = with_it.joined(without, shared, alike)
+        joined = with_it.joined(without, alike)
         if joined is with_it:
             return found
         if joined is not without:
@@ -196,7 +194,7 @@ NOISY: Final = ("motion.wide", "imu.noise", "gear.drift")
 limit in bends, so that the motion drifts off the gears."""
 
 UNSURE_STD: Final = 0.025
-"""Standard deviation of a mass, beside what is wrong in both, from which one without the inertial
+"""Standard deviation of a mass, beside doubts of the drive, from which one without the inertial
 sensor is asked for too [-]: that is 3 to 5 %, and has no weight beside a surer one."""
 
 ALIKE: Final = 0.5
@@ -205,13 +203,13 @@ vehicle and equipment, 0.4 in the mean. A file that was not calibrated without t
 same errors in both: the surer one counts."""
 
 
-def _unsure(found: Weighing, shared: float) -> bool:
+def _unsure(found: Weighing) -> bool:
     """Whether a mass is lacking or wide, perhaps by the inertial sensor."""
     result = found.result
     if result is None or not math.isfinite(result.mass):
         return False
     if found.status is Status.CONVERGED:
-        return result.own_std(shared) > UNSURE_STD * result.mass
+        return result.own_std > UNSURE_STD * result.mass
     return found.reason_id in NOISY
 
 
