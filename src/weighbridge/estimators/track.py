@@ -67,7 +67,7 @@ class MassTrack:
     mass, std : final answer and its standard deviation [kg]
     systematic_std : part of ``std`` that vehicle file and equipment leave, whatever the drive
         [kg]; NaN where a method does not say
-    doubt : part of ``std`` that is left by what else may explain the drive, relative to the mass [-]
+    doubt : part of ``std`` by what else may explain the drive, relative to the mass [-]
     degrees_of_freedom : behind ``std``, for the interval; infinite if known
     bound_std : Cramér-Rao bound of this drive [kg]
     converged_at : when the running mass stays within 5 % of the final answer
