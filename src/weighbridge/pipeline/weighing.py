@@ -152,8 +152,8 @@ def _refuse_unknown(method: str) -> None:
 def weigh_checked(drive: Drive, vehicle: Vehicle, method: str, settings: Any = None) -> Weighing:
     """Weigh as `weigh` does, from a drive that was checked and a known method.
 
-    By a slow or noisy inertial sensor ``joint`` weighs it without it as well. The errors of the two
-    masses are partly others, so the mean of both counts, by their uncertainty.
+    Where a slow or noisy inertial sensor leaves the mass unsure, ``joint`` weighs the drive without
+    it as well. Their errors are only partly the same, so the mean counts, by their uncertainty.
 
     Parameters
     ----------
