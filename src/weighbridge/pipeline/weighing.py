@@ -197,10 +197,10 @@ UNSURE_STD: Final = 0.025
 """Standard deviation of a mass, beside doubts of the drive, from which one without the inertial
 sensor is asked for too [-]: that is 3 to 5 %, and has no weight beside a surer one."""
 
-ALIKE: Final = 0.5
+ALIKE: Final = 0.7
 """Correlation of the errors of the two masses [-]: of 330 drives it was 0.0 to 0.8 by kind of
-vehicle and equipment, 0.4 in the mean. A file that was not calibrated without the sensor has the
-same errors in both: the surer one counts."""
+vehicle and equipment. A high one moves a sure mass little. A file that was not calibrated without
+the sensor has the same errors in both: the surer one counts."""
 
 
 def _unsure(found: Weighing) -> bool:
