@@ -162,7 +162,9 @@ def weigh_checked(drive: Drive, vehicle: Vehicle, method: str, settings: Any = N
     """
     found = _weigh_all(drive, vehicle, method, settings)
     with_it = found.result
-    if method != DEFAULT_METHOD or with_it is None or not _unsure(found):
+    if method != DEFAULT_METHOD or fitted_for_another(vehicle, method):
+        return found
+    if with_it is None or not _unsure(found):
         return found
     if with_it.balance.motion.source in BY_SPEED:
         return found
