@@ -196,7 +196,7 @@ def test_table_6_has_the_truth_and_our_fit_beside_the_printed_ones(car):
 def test_the_motorway_is_told_by_direction():
     def drive(running, speed, north):
         table = SimpleNamespace(
-            speed=np.array(speed), direction=(np.array(north), np.zeros(len(north)))
+            speed=np.array(speed), direction=(np.array(north), np.zeros(len(north))).__getitem__
         )
         return SimpleNamespace(
             balance=SimpleNamespace(table=table),

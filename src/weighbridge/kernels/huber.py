@@ -26,6 +26,42 @@ def _solve(matrix, right):
 
 
 @kernel
+def _median(x):
+    """Median of values (n,), which it reorders; quickselect (Hoare 1961).
+
+    That of numba needs BLAS, and loads SciPy.
+    """
+    n = x.size
+    if n == 0:
+        return np.nan
+    middle, left, right = n // 2, 0, n - 1
+    while left < right:
+        pivot = x[(left + right) // 2]
+        i, j = left, right
+        while i <= j:
+            while x[i] < pivot:
+                i += 1
+            while x[j] > pivot:
+                j -= 1
+            if i <= j:
+                x[i], x[j] = x[j], x[i]
+                i += 1
+                j -= 1
+        if middle <= j:
+            right = j
+        elif middle >= i:
+            left = i
+        else:
+            break
+    if n % 2 == 1:
+        return x[middle]
+    below = x[0]
+    for k in range(1, middle):
+        below = max(below, x[k])
+    return 0.5 * (below + x[middle])
+
+
+@kernel
 def _fit(columns, y, threshold, rounds, settled, found, weight):
     """One of `fits`; the parameters to ``found`` (k,), the weights to ``weight`` (n,)."""
     n, k = columns.shape
@@ -38,7 +74,8 @@ def _fit(columns, y, threshold, rounds, settled, found, weight):
         size[i] = np.sqrt(total / n) + 1e-300
         for row in range(n):
             scaled[i, row] = columns[row, i] / size[i]
-    off, new, matrix = np.empty(n), np.empty(k), np.empty((k, k))
+    off, sizes = np.empty(n), np.empty(n)
+    new, matrix = np.empty(k), np.empty((k, k))
     weight[:], found[:] = 1.0, 0.0
     for _ in range(rounds):
         for i in range(k):
@@ -65,10 +102,10 @@ def _fit(columns, y, threshold, rounds, settled, found, weight):
             left = y[row]
             for i in range(k):
                 left -= new[i] * scaled[i, row]
-            off[row] = abs(left)
+            off[row] = sizes[row] = abs(left)
             most = max(most, off[row])
         # What rounding leaves of a perfect fit is no outlier.
-        limit = threshold * 1.4826 * np.median(off) + 1e-12 * most + 1e-300
+        limit = threshold * 1.4826 * _median(sizes) + 1e-12 * most + 1e-300
         for row in range(n):
             weight[row] = limit / max(off[row], limit)
     for i in range(k):

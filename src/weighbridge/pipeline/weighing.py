@@ -196,8 +196,8 @@ NOISY: Final = ("motion.wide", "imu.noise", "gear.drift")
 limit in bends, so that the motion drifts off the gears."""
 
 UNSURE_STD: Final = 0.025
-"""Standard deviation of a mass, beside doubts of the drive, from which one without the inertial
-sensor is asked for too [-]: that is 3 to 5 %, and has no weight beside a surer one."""
+"""Standard deviation of a mass, beside what else may explain the drive, from which one without the
+inertial sensor is asked for too [-]: that is 3 to 5 %, and has no weight beside a surer one."""
 
 ALIKE: Final = 0.7
 """Correlation of the errors of the two masses [-]: of 330 drives it was 0.0 to 0.8 by kind of
